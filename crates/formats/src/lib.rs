@@ -1,0 +1,1 @@
+//! Motion file formats: bytes to model and back.

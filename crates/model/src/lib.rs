@@ -1,0 +1,1 @@
+//! The vocabulary: skeleton, joint, pose, motion, point trajectories.

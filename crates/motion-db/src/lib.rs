@@ -1,0 +1,1 @@
+//! Motion database: invariant windows, neighbour search, the index file.

@@ -1,0 +1,1 @@
+//! Energy terms and the solver for the most probable pose.

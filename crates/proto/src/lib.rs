@@ -1,0 +1,1 @@
+//! Generated gRPC code and wire to model conversions.

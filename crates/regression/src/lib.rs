@@ -1,0 +1,1 @@
+//! Local regression of the next pose on windows of motion.

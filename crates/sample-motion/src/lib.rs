@@ -1,0 +1,1 @@
+//! A small statistical model of human motion, and motion drawn from it.

@@ -1,0 +1,1 @@
+//! Configuration, telemetry, health and shutdown shared by the services.

@@ -1,0 +1,1 @@
+//! Sparse reconstruction: full-body motion from a few control points.

@@ -1,0 +1,1 @@
+//! Throw-away PostgreSQL and synthetic captures for tests.

@@ -1,0 +1,1 @@
+//! The motion-index service: builds motion databases and answers queries on them.

@@ -1,0 +1,1 @@
+//! The reconstruction service: full-body motion from control points.
