@@ -1,1 +1,28 @@
-//! The vocabulary: skeleton, joint, pose, motion, point trajectories.
+//! The vocabulary of Marey: skeletons, poses, motions and point trajectories.
+//!
+//! Units inside the program: metres, seconds, radians; y is up; coordinates are right-handed. Files in
+//! other units are converted when they are read and written (crate `formats`).
+//! Transforms are named `a_from_b`, so that spaces cancel.
+//!
+//! ```
+//! use model::{Axis, Channel, Joint, Motion, Skeleton};
+//! let root = Joint::root("hips", vec![Channel::translation(Axis::Y), Channel::rotation(Axis::X)]);
+//! let skeleton = Skeleton::new("two numbers", vec![root]).unwrap();
+//! let motion = Motion::new(skeleton.into(), 60.0, vec![0.9, 0.1, 0.9, 0.2]).unwrap();
+//! assert_eq!(motion.num_frames(), 2);
+//! ```
+
+mod error;
+mod joint;
+mod motion;
+mod points;
+mod skeleton;
+
+pub use error::Error;
+pub use joint::{Axis, Channel, ChannelKind, Joint};
+pub use motion::Motion;
+pub use points::PointTrajectories;
+pub use skeleton::Skeleton;
+
+/// Result of the constructors of this crate.
+pub type Result<T> = std::result::Result<T, Error>;

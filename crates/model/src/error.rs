@@ -1,0 +1,76 @@
+/// What is wrong with a skeleton, a motion or a set of trajectories.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A skeleton needs a root.
+    #[error("skeleton has no joints, expected at least a root")]
+    NoJoints,
+    /// Joints are stored parents first.
+    #[error(
+        "joint {joint} ({name}) has parent {parent:?}, expected an earlier joint (only joint 0 is the root)"
+    )]
+    ParentOrder {
+        /// index of the joint
+        joint: usize,
+        /// its name
+        name: String,
+        /// the parent found
+        parent: Option<usize>,
+    },
+    /// Two joints may not share a name.
+    #[error("two joints are named {name}, expected names to be unique")]
+    DuplicateName {
+        /// the name
+        name: String,
+    },
+    /// A joint has the same channel twice.
+    #[error("joint {name} has channel {channel} twice")]
+    DuplicateChannel {
+        /// name of the joint
+        name: String,
+        /// the channel
+        channel: String,
+    },
+    /// A length, angle or limit is not a finite number.
+    #[error("{what} of joint {name} is not finite")]
+    NotFinite {
+        /// which quantity
+        what: &'static str,
+        /// name of the joint
+        name: String,
+    },
+    /// The number of values is not a multiple of the number of DOFs.
+    #[error("motion has {values} values, expected a multiple of the skeleton's {dofs} DOFs")]
+    ValueCount {
+        /// values found
+        values: usize,
+        /// DOFs of the skeleton
+        dofs: usize,
+    },
+    /// A frame rate that is not positive and finite.
+    #[error("frame rate is {found}, expected a positive number")]
+    FrameRate {
+        /// the rate found
+        found: f64,
+    },
+    /// A value of a motion is not a finite number.
+    #[error("frame {frame}, channel {channel} of joint {joint} is {found}, expected a finite number")]
+    NotFiniteValue {
+        /// frame, from 0
+        frame: usize,
+        /// name of the joint
+        joint: String,
+        /// name of the channel
+        channel: String,
+        /// the value found
+        found: f64,
+    },
+    /// The number of positions is not frames times points.
+    #[error("found {positions} positions, expected a multiple of {points} points")]
+    PositionCount {
+        /// positions found
+        positions: usize,
+        /// number of points
+        points: usize,
+    },
+}
