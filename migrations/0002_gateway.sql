@@ -19,6 +19,7 @@ CREATE TABLE api_keys (
 );
 CREATE INDEX api_keys_of_project ON api_keys (project_id);
 
+-- Ids are UUIDv7, so their order is the order of creation: lists are paged newest first by id.
 CREATE TABLE sessions (
     id          uuid        PRIMARY KEY,
     project_id  uuid        NOT NULL REFERENCES projects ON DELETE CASCADE,
@@ -26,30 +27,31 @@ CREATE TABLE sessions (
     tags        text[]      NOT NULL DEFAULT '{}',
     created_at  timestamptz NOT NULL DEFAULT now()
 );
--- lists are paged newest first by (created_at, id)
-CREATE INDEX sessions_of_project ON sessions (project_id, created_at DESC, id DESC);
+CREATE INDEX sessions_of_project ON sessions (project_id, id DESC);
 
--- One row is one version of a named database. It collects files while `open`; its files are fixed from `building`
--- on, and when it is `ready` it never changes again.
+-- One row is one version of a named database. Its state is not stored but follows from the rest:
+--   open      no build run yet: it collects files
+--   building  its build run goes on: its files are fixed
+--   failed    its build run failed or was cancelled: it collects files again
+--   ready     it has an index file: it never changes again
 CREATE TABLE motion_databases (
-    id          uuid        PRIMARY KEY,
-    project_id  uuid        NOT NULL REFERENCES projects ON DELETE CASCADE,
-    name        text        NOT NULL CHECK (name ~ '^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$'),
-    version     integer     NOT NULL CHECK (version >= 1),
-    state       text        NOT NULL DEFAULT 'open' CHECK (state IN ('open', 'building', 'ready', 'failed')),
-    -- the index file, set by the job that built it
-    store_key   text,
-    bytes       bigint      CHECK (bytes >= 0),
-    blake3      text        CHECK (blake3 ~ '^[0-9a-f]{64}$'),
-    num_poses   bigint      CHECK (num_poses >= 0),
-    num_clips   bigint      CHECK (num_clips >= 0),
-    skeleton    text,
-    created_at  timestamptz NOT NULL DEFAULT now(),
-    ready_at    timestamptz,
+    id           uuid        PRIMARY KEY,
+    project_id   uuid        NOT NULL REFERENCES projects ON DELETE CASCADE,
+    name         text        NOT NULL CHECK (name ~ '^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$'),
+    version      integer     NOT NULL CHECK (version >= 1),
+    build_run_id uuid        REFERENCES runs ON DELETE SET NULL,
+    -- set together by the job that built it, in its completing transaction
+    store_key    text,
+    bytes        bigint      CHECK (bytes >= 0),
+    blake3       text        CHECK (blake3 ~ '^[0-9a-f]{64}$'),
+    num_poses    bigint      CHECK (num_poses >= 0),
+    num_clips    bigint      CHECK (num_clips >= 0),
+    skeleton     text,
+    ready_at     timestamptz,
+    created_at   timestamptz NOT NULL DEFAULT now(),
     UNIQUE (project_id, name, version),
     CONSTRAINT ready_means_built CHECK (
-        (state = 'ready') = (store_key IS NOT NULL AND bytes IS NOT NULL AND blake3 IS NOT NULL
-                             AND num_poses IS NOT NULL AND num_clips IS NOT NULL AND ready_at IS NOT NULL))
+        num_nonnulls(store_key, bytes, blake3, num_poses, num_clips, ready_at) IN (0, 6))
 );
 
 -- A file belongs to a session or to a motion database. A row exists only when the whole upload is in the store and
@@ -86,10 +88,11 @@ CREATE TABLE idempotency_keys (
 );
 CREATE INDEX idempotency_keys_by_age ON idempotency_keys (created_at);
 
--- `motion_database_id`: the database that a reconstruction reads, or that a 'motion-database' run builds.
+-- `motion_database_id`: the database that a reconstruction reads.
 ALTER TABLE runs
     ADD COLUMN motion_database_id uuid REFERENCES motion_databases ON DELETE SET NULL,
     ADD CONSTRAINT runs_project FOREIGN KEY (project_id) REFERENCES projects ON DELETE CASCADE,
     ADD CONSTRAINT runs_session FOREIGN KEY (session_id) REFERENCES sessions ON DELETE CASCADE;
-CREATE INDEX runs_of_session ON runs (session_id, created_at DESC, id DESC);
+CREATE INDEX runs_of_project ON runs (project_id, id DESC);
+CREATE INDEX runs_of_session ON runs (session_id, id DESC);
 CREATE INDEX runs_of_motion_database ON runs (motion_database_id);

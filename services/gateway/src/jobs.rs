@@ -16,9 +16,8 @@ pub const PLAN_SPARSE: &str = "plan-sparse";
 
 /// Builds a motion database from uploaded files of role `motion` and `skeleton`.
 ///
-/// The job that completes sets `state = 'ready'`, `store_key`, `bytes`, `blake3`, `num_poses`, `num_clips`, `skeleton`
-/// and `ready_at` of its row in `motion_databases`, in its completing transaction. A database whose run ends in another way is
-/// set to `failed` by the gateway.
+/// The job sets `store_key`, `bytes`, `blake3`, `num_poses`, `num_clips`, `skeleton` and `ready_at` of its row in
+/// `motion_databases` in its completing transaction: from then on the database is ready.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BuildMotionDatabase {
     /// the database to build
