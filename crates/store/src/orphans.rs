@@ -1,0 +1,32 @@
+//! Removing what lost attempts left behind.
+
+use crate::{Error, Key, Store};
+use futures::TryStreamExt;
+use std::collections::HashSet;
+
+impl Store {
+    /// Removes every object under `prefix` whose key is not in `keep`; returns how many.
+    ///
+    /// To be called when nobody writes under `prefix` that anybody will ask for: a run that has ended.
+    /// A worker that lost its lease may still write there later; what it writes is named by no row.
+    ///
+    /// # Errors
+    /// [`Error::Backend`]; objects removed until then stay removed.
+    pub async fn remove_orphans(&self, prefix: &Key, keep: &HashSet<Key>) -> Result<usize, Error> {
+        let found: Vec<Key> = self.list(prefix).map_ok(|(key, _)| key).try_collect().await?;
+        let mut removed = 0;
+        for key in found.iter().filter(|key| !keep.contains(key)) {
+            self.delete(key).await?;
+            removed += 1;
+        }
+        Ok(removed)
+    }
+
+    /// Removes every object under `prefix`; returns how many.
+    ///
+    /// # Errors
+    /// [`Error::Backend`]; objects removed until then stay removed.
+    pub async fn remove_all(&self, prefix: &Key) -> Result<usize, Error> {
+        self.remove_orphans(prefix, &HashSet::new()).await
+    }
+}
