@@ -1,0 +1,17 @@
+//! Compiles `proto/marey/v1/*.proto` without `protoc`, and keeps the descriptors for reflection.
+
+use prost::Message;
+use std::{error::Error, path::PathBuf};
+
+const ROOT: &str = "../../proto";
+const FILES: [&str; 3] =
+    ["marey/v1/geometry.proto", "marey/v1/motion_index.proto", "marey/v1/reconstruction.proto"];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    println!("cargo:rerun-if-changed={ROOT}");
+    let descriptors = protox::compile(FILES, [ROOT])?;
+    let out = PathBuf::from(std::env::var("OUT_DIR")?);
+    std::fs::write(out.join("marey_descriptors.bin"), descriptors.encode_to_vec())?;
+    tonic_prost_build::configure().compile_fds(descriptors)?;
+    Ok(())
+}
