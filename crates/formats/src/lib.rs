@@ -1,1 +1,26 @@
 //! Motion file formats: bytes to model and back.
+//!
+//! Every reader takes bytes and gives a [`Read`]: the value, in metres, seconds and radians with y up, and the
+//! warnings about what was sloppy in the file. What can't be read is an [`Error`] that says where (line or byte
+//! offset), what was found and what was expected. Readers never panic and need memory in proportion to the
+//! bytes they are given, whatever the bytes claim. The dialects are described in `docs/formats.md`.
+//!
+//! ```
+//! let asf = b":units\n length 0.45\n angle deg\n:root\n order TX TY TZ RX RY RZ\n axis XYZ\n:bonedata\n:hierarchy\n";
+//! let acclaim = formats::asf::read(asf).unwrap().value;
+//! let motion = formats::amc::read(b":DEGREES\n1\nroot 0 17 0 0 90 0\n", &acclaim, 120.0).unwrap().value;
+//! assert!((motion.pose(0)[1] - 17.0 * 0.0254 / 0.45).abs() < 1e-12);
+//! ```
+
+pub mod amc;
+pub mod asf;
+mod error;
+mod euler;
+mod read;
+mod text;
+
+pub use error::{Error, Place};
+pub use read::{Read, Warning};
+
+/// Result of the readers.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,70 @@
+use std::fmt;
+
+/// Where in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// line of a text file, from 1
+    Line(usize),
+    /// offset in a binary file, bytes from 0
+    Byte(u64),
+    /// the file as a whole
+    File,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(offset) => write!(f, "byte {offset}"),
+            Self::File => f.write_str("file"),
+        }
+    }
+}
+
+/// Why a file could not be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The file says something else than the format allows.
+    #[error("{place}: found {found}, expected {expected}")]
+    Unexpected {
+        /// where
+        place: Place,
+        /// what is there
+        found: String,
+        /// what may be there
+        expected: String,
+    },
+    /// What the file says does not make a skeleton, a motion or trajectories.
+    #[error("{place}: {source}")]
+    Model {
+        /// where
+        place: Place,
+        /// what is wrong with it
+        source: model::Error,
+    },
+    /// A file of several could not be read.
+    #[error("{file}: {source}")]
+    InFile {
+        /// name of the file
+        file: String,
+        /// what is wrong with it
+        source: Box<Error>,
+    },
+}
+
+impl Error {
+    pub(crate) fn at_line(line: usize, found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self::Unexpected { place: Place::Line(line), found: found.into(), expected: expected.into() }
+    }
+
+    pub(crate) fn in_file(found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self::Unexpected { place: Place::File, found: found.into(), expected: expected.into() }
+    }
+}
+
+impl From<model::Error> for Error {
+    fn from(source: model::Error) -> Self {
+        Self::Model { place: Place::File, source }
+    }
+}

@@ -1,0 +1,132 @@
+//! Lines, words and numbers of text formats.
+
+/// One line without its end and without blanks around it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Line<'a> {
+    /// from 1
+    pub(crate) number: usize,
+    pub(crate) text: &'a [u8],
+}
+
+/// The lines of a file; LF, CRLF and CR end a line, a byte order mark is skipped.
+#[derive(Debug, Clone)]
+pub(crate) struct Lines<'a> {
+    rest: &'a [u8],
+    number: usize,
+}
+
+impl<'a> Lines<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Self {
+        Self { rest: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), number: 0 }
+    }
+
+    /// Number of the line read last.
+    pub(crate) fn number(&self) -> usize {
+        self.number
+    }
+
+    /// The next line with the blanks around it.
+    pub(crate) fn next_untrimmed(&mut self) -> Option<Line<'a>> {
+        if self.rest.is_empty() {
+            return None;
+        }
+        self.number += 1;
+        let end = self.rest.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(self.rest.len());
+        let text = &self.rest[..end];
+        let after = if self.rest[end..].starts_with(b"\r\n") { end + 2 } else { end + 1 };
+        self.rest = self.rest.get(after..).unwrap_or_default();
+        Some(Line { number: self.number, text })
+    }
+}
+
+impl<'a> Iterator for Lines<'a> {
+    type Item = Line<'a>;
+
+    fn next(&mut self) -> Option<Line<'a>> {
+        self.next_untrimmed().map(|line| Line { text: line.text.trim_ascii(), ..line })
+    }
+}
+
+/// The words of a line: what blanks separate.
+pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    text.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty())
+}
+
+/// A number as C prints it; infinities and NaN are numbers here.
+pub(crate) fn number(word: &[u8]) -> Option<f64> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// A number that is neither infinite nor NaN.
+pub(crate) fn finite(word: &[u8]) -> Option<f64> {
+    number(word).filter(|v| v.is_finite())
+}
+
+/// A name as it is stored.
+pub(crate) fn name(word: &[u8]) -> String {
+    String::from_utf8_lossy(word).into_owned()
+}
+
+/// Bytes of a file in a message: in quotes, not longer than a message should be.
+pub(crate) fn quote(bytes: &[u8]) -> String {
+    const LONGEST: usize = 40;
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * LONGEST)]);
+    if text.chars().count() <= LONGEST {
+        format!("{:?}", text)
+    } else {
+        format!("{:?}…", text.chars().take(LONGEST).collect::<String>())
+    }
+}
+
+/// Appends a number with at most seven decimals, without trailing zeros.
+pub(crate) fn push_number(out: &mut String, value: f64) {
+    use std::fmt::Write as _;
+    let start = out.len();
+    // writing to a String can't fail
+    let _ = write!(out, "{value:.7}");
+    let kept = out[start..].trim_end_matches('0').trim_end_matches('.').len();
+    out.truncate(start + kept);
+    if &out[start..] == "-0" {
+        out.replace_range(start.., "0");
+    }
+}
+
+/// A name that has no blanks and is not in `taken`, made from `name`; it is then taken.
+pub(crate) fn unique_word(name: &str, taken: &mut std::collections::HashSet<String>) -> String {
+    let mut word: String =
+        name.chars().map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c }).collect();
+    if word.is_empty() {
+        word.push_str("joint");
+    }
+    let stem_len = word.len();
+    let mut number = 2;
+    while taken.contains(&word) {
+        word.truncate(stem_len);
+        word.push_str(&format!("_{number}"));
+        number += 1;
+    }
+    taken.insert(word.clone());
+    word
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_kinds_of_line_end_count_as_one() {
+        let lines: Vec<_> =
+            Lines::new(b"\xef\xbb\xbfa\r\n\nb\rc").map(|l| (l.number, l.text.to_vec())).collect();
+        assert_eq!(lines, [(1, b"a".to_vec()), (2, vec![]), (3, b"b".to_vec()), (4, b"c".to_vec())]);
+    }
+
+    #[test]
+    fn numbers_are_written_without_trailing_zeros() {
+        let mut out = String::new();
+        for value in [1.5, -0.0, 100.0, 1e-9, -2.25] {
+            push_number(&mut out, value);
+            out.push(' ');
+        }
+        assert_eq!(out, "1.5 0 100 0 -2.25 ");
+    }
+}
