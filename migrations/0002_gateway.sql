@@ -91,8 +91,6 @@ CREATE INDEX idempotency_keys_by_age ON idempotency_keys (created_at);
 -- `motion_database_id`: the database that a reconstruction reads.
 ALTER TABLE runs
     ADD COLUMN motion_database_id uuid REFERENCES motion_databases ON DELETE SET NULL,
-    ADD CONSTRAINT runs_project FOREIGN KEY (project_id) REFERENCES projects ON DELETE CASCADE,
     ADD CONSTRAINT runs_session FOREIGN KEY (session_id) REFERENCES sessions ON DELETE CASCADE;
 CREATE INDEX runs_of_project ON runs (project_id, id DESC);
-CREATE INDEX runs_of_session ON runs (session_id, id DESC);
 CREATE INDEX runs_of_motion_database ON runs (motion_database_id);

@@ -1,1 +1,29 @@
-//! The HTTP gateway.
+//! The HTTP gateway: people's way in.
+//!
+//! It keeps nothing itself. What people upload goes to the object store, what they ask for goes into PostgreSQL as a
+//! run with its first job in one transaction, and what comes of it is read back from both. The API is described in
+//! `docs/api.md` and, by the server itself, at `/openapi.json` and `/docs`.
+
+pub mod access;
+mod answer;
+mod app;
+mod config;
+mod error;
+mod extract;
+mod housekeeping;
+mod idempotency;
+pub mod jobs;
+mod names;
+mod observe;
+mod openapi;
+mod page;
+mod routes;
+mod server;
+mod upload;
+
+pub use app::App;
+pub use config::Config;
+pub use error::Error;
+pub use openapi::document as openapi_document;
+pub use routes::router;
+pub use server::{Gateway, run};
