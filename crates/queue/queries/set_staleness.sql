@@ -1,0 +1,1 @@
+UPDATE queue_settings SET staleness = make_interval(secs => $1)

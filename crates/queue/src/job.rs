@@ -1,0 +1,140 @@
+//! Jobs to be enqueued, jobs that were claimed, and what jobs leave behind.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::{JobId, LeaseNumber, ProjectId, RunId};
+
+/// Attempts that a job gets unless it says otherwise.
+pub const DEFAULT_MAX_ATTEMPTS: i32 = 3;
+
+/// A job to be added to a run.
+#[derive(Debug, Clone)]
+pub struct NewJob<'a> {
+    /// The run that it belongs to.
+    pub run_id: RunId,
+    /// Which handler runs it.
+    pub kind: &'a str,
+    /// What the handler is given.
+    pub payload: Value,
+    /// Higher goes first within a project; 0 is usual.
+    pub priority: i16,
+    /// After so many failed attempts the job has failed for good; 1 to 1000.
+    pub max_attempts: i32,
+    /// Jobs of the same run that must have succeeded before.
+    pub depends_on: &'a [JobId],
+    /// Share in the run's progress, above 0; 1 is usual.
+    pub weight: f64,
+}
+
+impl<'a> NewJob<'a> {
+    /// A job with the usual priority, attempts and weight that depends on nothing.
+    pub fn new(run_id: RunId, kind: &'a str, payload: Value) -> Self {
+        Self {
+            run_id,
+            kind,
+            payload,
+            priority: 0,
+            max_attempts: DEFAULT_MAX_ATTEMPTS,
+            depends_on: &[],
+            weight: 1.0,
+        }
+    }
+}
+
+/// A job of a batch: the children that a job asks for when it completes, or the jobs of a new run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChildJob {
+    /// Which handler runs it.
+    pub kind: String,
+    /// What the handler is given.
+    pub payload: Value,
+    /// Higher goes first within a project; 0 is usual.
+    pub priority: i16,
+    /// After so many failed attempts the job has failed for good; 1 to 1000.
+    pub max_attempts: i32,
+    /// Positions in the batch of jobs that must have succeeded before; each before this one's own.
+    pub depends_on: Vec<usize>,
+    /// Share in the run's progress, above 0; 1 is usual.
+    pub weight: f64,
+}
+
+impl ChildJob {
+    /// A job with the usual priority, attempts and weight that depends on nothing.
+    pub fn new(kind: impl Into<String>, payload: Value) -> Self {
+        Self {
+            kind: kind.into(),
+            payload,
+            priority: 0,
+            max_attempts: DEFAULT_MAX_ATTEMPTS,
+            depends_on: Vec::new(),
+            weight: 1.0,
+        }
+    }
+
+    /// The same job, waiting for these positions of the batch.
+    #[must_use]
+    pub fn depends_on(mut self, positions: impl IntoIterator<Item = usize>) -> Self {
+        self.depends_on = positions.into_iter().collect();
+        self
+    }
+
+    /// The same job with another share in the run's progress.
+    #[must_use]
+    pub fn weight(mut self, weight: f64) -> Self {
+        self.weight = weight;
+        self
+    }
+
+    /// The same job with another priority; higher goes first within a project.
+    #[must_use]
+    pub fn priority(mut self, priority: i16) -> Self {
+        self.priority = priority;
+        self
+    }
+
+    /// The same job with another number of attempts, 1 to 1000.
+    #[must_use]
+    pub fn max_attempts(mut self, attempts: i32) -> Self {
+        self.max_attempts = attempts;
+        self
+    }
+}
+
+/// A job as its claimer got it. Holding it is holding a lease, as long as heartbeats are answered.
+#[derive(Debug, Clone, PartialEq, sqlx::FromRow)]
+pub struct ClaimedJob {
+    /// The job.
+    pub id: JobId,
+    /// The run that it belongs to.
+    pub run_id: RunId,
+    /// The project that it belongs to.
+    pub project_id: ProjectId,
+    /// Which handler runs it.
+    pub kind: String,
+    /// What the handler is given.
+    pub payload: Value,
+    /// Which attempt this is, from 1.
+    pub attempt: i32,
+    /// How many attempts there are.
+    pub max_attempts: i32,
+    /// The number of this claim.
+    pub lease_number: LeaseNumber,
+}
+
+/// A file that a job left in the object store.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, sqlx::FromRow)]
+pub struct Artefact {
+    /// Name within the job, and for a result within the run.
+    pub name: String,
+    /// Key in the object store. It contains the lease number, so that two attempts never write one key.
+    pub store_key: String,
+    /// Length, bytes.
+    pub bytes: i64,
+    /// BLAKE3 of the content, 64 lower-case hexadecimal digits.
+    pub blake3: String,
+    /// Such as `application/json`.
+    pub media_type: String,
+    /// Whether the user gets it.
+    pub is_result: bool,
+}

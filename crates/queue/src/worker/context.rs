@@ -1,0 +1,183 @@
+//! What a handler knows of the job that it runs, and what the worker knows of it.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use tokio::sync::Notify;
+use tokio_util::sync::CancellationToken;
+
+use super::handler::{JobError, read_payload};
+use crate::lease::clamp;
+use crate::{ClaimedJob, JobId, Lease, LeaseNumber, ProjectId, RunId};
+
+/// One attempt at a job, as its [`Handler`](super::Handler) sees it. Cheap to clone.
+#[derive(Clone)]
+pub struct JobContext {
+    job: Arc<ClaimedJob>,
+    held: Arc<Held>,
+}
+
+impl JobContext {
+    pub(super) fn new(job: Arc<ClaimedJob>, held: Arc<Held>) -> Self {
+        Self { job, held }
+    }
+
+    /// The job.
+    pub fn id(&self) -> JobId {
+        self.job.id
+    }
+
+    /// The run that it belongs to.
+    pub fn run_id(&self) -> RunId {
+        self.job.run_id
+    }
+
+    /// The project that it belongs to.
+    pub fn project_id(&self) -> ProjectId {
+        self.job.project_id
+    }
+
+    /// Which attempt this is, from 1.
+    pub fn attempt(&self) -> i32 {
+        self.job.attempt
+    }
+
+    /// How many attempts there are.
+    pub fn max_attempts(&self) -> i32 {
+        self.job.max_attempts
+    }
+
+    /// The number of this claim; no two attempts at a job share one. Belongs into the name of every file
+    /// that the attempt writes.
+    pub fn lease_number(&self) -> LeaseNumber {
+        self.job.lease_number
+    }
+
+    /// The payload, read.
+    ///
+    /// # Errors
+    /// [`JobError::GiveUp`] if it is not a `T`.
+    pub fn payload<T: DeserializeOwned>(&self) -> Result<T, JobError> {
+        read_payload(&self.job.kind, &self.job.payload)
+    }
+
+    /// The payload as it was enqueued.
+    pub fn raw_payload(&self) -> &Value {
+        &self.job.payload
+    }
+
+    /// Tells the user how far the job is: 0 to 1, and a phrase. Cheap enough for every frame: only the
+    /// newest is sent, a few times a second.
+    pub fn progress(&self, fraction: f64, phrase: impl Into<String>) {
+        *lock(&self.held.progress) = Some((clamp(fraction), phrase.into()));
+        self.held.progressed.notify_one();
+    }
+
+    /// Whether to stop: the run was cancelled, the lease was lost, or the worker shuts down and its grace
+    /// is over. For work on other threads.
+    pub fn is_cancelled(&self) -> bool {
+        self.held.stop.is_cancelled()
+    }
+
+    /// Resolves when it is time to stop.
+    pub async fn cancelled(&self) {
+        self.held.stop.cancelled().await;
+    }
+
+    /// The token behind [`cancelled`](Self::cancelled), for work that takes one.
+    pub fn cancel_token(&self) -> CancellationToken {
+        self.held.stop.clone()
+    }
+
+    /// `job.check()?` stops the handler when it is time to.
+    ///
+    /// # Errors
+    /// [`JobError::Stopped`].
+    pub fn check(&self) -> Result<(), JobError> {
+        if self.is_cancelled() { Err(JobError::Stopped) } else { Ok(()) }
+    }
+}
+
+/// Why a handler is stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stop {
+    Cancelled,
+    LeaseLost,
+    Shutdown,
+}
+
+/// A lease that this worker holds.
+pub(super) struct Held {
+    pub(super) lease: Lease,
+    pub(super) stop: CancellationToken,
+    reason: OnceLock<Stop>,
+    progress: Mutex<Option<(f64, String)>>,
+    /// Shared by all of a worker.
+    progressed: Arc<Notify>,
+}
+
+impl Held {
+    /// Tells the handler to stop. The first reason counts.
+    pub(super) fn stop(&self, reason: Stop) {
+        self.reason.get_or_init(|| reason);
+        self.stop.cancel();
+    }
+
+    pub(super) fn stopped(&self) -> Option<Stop> {
+        self.reason.get().copied()
+    }
+
+    pub(super) fn take_progress(&self) -> Option<(f64, String)> {
+        lock(&self.progress).take()
+    }
+
+    /// What could not be sent is sent with the next beat, unless there is something newer by then.
+    pub(super) fn put_back_progress(&self, unsent: Option<(f64, String)>) {
+        let mut progress = lock(&self.progress);
+        if progress.is_none() {
+            *progress = unsent;
+        }
+    }
+
+    pub(super) fn has_progress(&self) -> bool {
+        lock(&self.progress).is_some()
+    }
+}
+
+/// All leases that a worker holds.
+#[derive(Default)]
+pub(super) struct HeldJobs {
+    // By claim and not by job: after a lost lease the same worker may get the job again.
+    jobs: Mutex<HashMap<(JobId, LeaseNumber), Arc<Held>>>,
+    /// Some job has new progress.
+    pub(super) progressed: Arc<Notify>,
+}
+
+impl HeldJobs {
+    pub(super) fn add(&self, lease: Lease) -> Arc<Held> {
+        let held = Arc::new(Held {
+            lease,
+            stop: CancellationToken::new(),
+            reason: OnceLock::new(),
+            progress: Mutex::new(None),
+            progressed: self.progressed.clone(),
+        });
+        lock(&self.jobs).insert((lease.job_id, lease.lease_number), held.clone());
+        held
+    }
+
+    pub(super) fn remove(&self, lease: &Lease) {
+        lock(&self.jobs).remove(&(lease.job_id, lease.lease_number));
+    }
+
+    pub(super) fn all(&self) -> Vec<Arc<Held>> {
+        lock(&self.jobs).values().cloned().collect()
+    }
+}
+
+/// A panic of someone who held the lock leaves nothing half-done in what we keep under one.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
