@@ -133,8 +133,7 @@ impl Kinematics {
         }
         state.positions[index] = position;
         // The frame in which the joint's rotation axes are given.
-        let world_from_axes =
-            if joint.has_axes { world_from_parent * joint.axes } else { world_from_parent };
+        let world_from_axes = if joint.has_axes { world_from_parent * joint.axes } else { world_from_parent };
         let turned = match &joint.rotation {
             JointRotation::Angles(angles) => {
                 let mut turned = world_from_axes;

@@ -7,7 +7,13 @@ impl PointSet {
     /// metres per metre or radian. `state` must be that of [`PointSet::positions`], `positions` its result.
     ///
     /// An angle turns the point about its axis through the joint, a translation shifts it along its axis.
-    pub fn jacobian(&self, kinematics: &Kinematics, state: &State, positions: &[Vector3<f64>], out: &mut [f64]) {
+    pub fn jacobian(
+        &self,
+        kinematics: &Kinematics,
+        state: &State,
+        positions: &[Vector3<f64>],
+        out: &mut [f64],
+    ) {
         let width = kinematics.num_dofs();
         out[..3 * self.points.len() * width].fill(0.0);
         for (p, (position, dofs)) in positions.iter().zip(&self.dofs).enumerate() {
@@ -52,7 +58,9 @@ pub fn check_jacobian(
             let difference = (high[row] - low[row]) / (2.0 * step);
             let analytic = jacobian[row * x.len() + dof];
             if !((difference - analytic).abs() <= tolerance * difference.abs().max(1.0)) {
-                return Err(format!("row {row}, coordinate {dof}: analytic {analytic}, differences {difference}"));
+                return Err(format!(
+                    "row {row}, coordinate {dof}: analytic {analytic}, differences {difference}"
+                ));
             }
         }
     }

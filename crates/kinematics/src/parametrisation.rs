@@ -84,7 +84,13 @@ impl Parametrisation {
 
     /// Smooth coordinates of a pose. `pose`: channel values, metres and radians, shape `[dofs]`; `previous`:
     /// coordinates near which angles are unwrapped; `out`: coordinates, shape `[dofs]`.
-    pub fn coordinates_from_pose(&self, skeleton: &Skeleton, pose: &[f64], previous: Option<&[f64]>, out: &mut [f64]) {
+    pub fn coordinates_from_pose(
+        &self,
+        skeleton: &Skeleton,
+        pose: &[f64],
+        previous: Option<&[f64]>,
+        out: &mut [f64],
+    ) {
         for (j, joint) in skeleton.joints().iter().enumerate() {
             let base = skeleton.dofs(j).start;
             let near = |dof: usize| previous.map_or(0.0, |p| p[dof]);
@@ -95,7 +101,7 @@ impl Parametrisation {
                 JointRotation::Angles(angles) => {
                     for (dof, axis) in angles {
                         let angle = base_value(&joint.channels, base, ChannelKind::Rotation, *axis, pose);
-                        out[*dof] = previous.map_or(angle, |p| unwrap_near(angle, p[*dof]));
+                        out[*dof] = unwrap_near(angle, near(*dof));
                     }
                 }
                 JointRotation::Vector { first_dof, reference } => {
@@ -119,7 +125,13 @@ impl Parametrisation {
 
     /// Channel values of smooth coordinates: the inverse of [`Self::coordinates_from_pose`]. Euler angles are taken
     /// nearest to those of `previous` (a pose in channels), or to 0.
-    pub fn pose_from_coordinates(&self, skeleton: &Skeleton, x: &[f64], previous: Option<&[f64]>, out: &mut [f64]) {
+    pub fn pose_from_coordinates(
+        &self,
+        skeleton: &Skeleton,
+        x: &[f64],
+        previous: Option<&[f64]>,
+        out: &mut [f64],
+    ) {
         for (j, joint) in skeleton.joints().iter().enumerate() {
             let base = skeleton.dofs(j).start;
             for (dof, axis) in &self.translations[j] {
@@ -131,7 +143,8 @@ impl Parametrisation {
                 JointRotation::Angles(angles) => {
                     for (dof, axis) in angles {
                         if let Some(slot) = channel_slot(&joint.channels, ChannelKind::Rotation, *axis) {
-                            out[base + slot] = previous.map_or(x[*dof], |p| unwrap_near(x[*dof], p[base + slot]));
+                            out[base + slot] =
+                                previous.map_or(x[*dof], |p| unwrap_near(x[*dof], p[base + slot]));
                         }
                     }
                     continue;
@@ -147,7 +160,8 @@ impl Parametrisation {
                 }
             };
             let [a, b, c] = joint.rotation_order[..] else { continue };
-            let slots = [a, b, c].map(|axis| channel_slot(&joint.channels, ChannelKind::Rotation, axis).unwrap_or(0));
+            let slots =
+                [a, b, c].map(|axis| channel_slot(&joint.channels, ChannelKind::Rotation, axis).unwrap_or(0));
             let near = slots.map(|slot| previous.map_or(0.0, |p| p[base + slot]));
             for (slot, angle) in slots.into_iter().zip(angles_from_rotation([a, b, c], &rotation, near)) {
                 out[base + slot] = angle;
@@ -159,7 +173,9 @@ impl Parametrisation {
 /// Heading (radians) and tilt vector (radians, y = 0) with `rotation = R_y(heading) · exp(tilt)`.
 fn heading_and_tilt(rotation: &Matrix3<f64>) -> (f64, Vector3<f64>) {
     // Twist of the quaternion about y.
-    let q = nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(*rotation));
+    let q = nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(
+        *rotation,
+    ));
     let heading = 2.0 * q.j.atan2(q.w);
     let tilt = rotation_log(&(rotation_exp(&Vector3::new(0.0, -heading, 0.0)) * rotation));
     (heading, tilt)

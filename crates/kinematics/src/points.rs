@@ -17,10 +17,22 @@ pub struct ControlPoint {
 /// The papers' control points and the joints that may stand for each, with `true` where the far end of the
 /// joint's bone is meant: names of the CMU skeleton first, then those of common BVH rigs.
 const STANDARD: [(&str, &[(&str, bool)]); 6] = [
-    ("left_wrist", &[("lhand", false), ("LeftHand", false), ("mixamorig:LeftHand", false), ("LeftWrist", false)]),
-    ("right_wrist", &[("rhand", false), ("RightHand", false), ("mixamorig:RightHand", false), ("RightWrist", false)]),
-    ("left_ankle", &[("lfoot", false), ("LeftFoot", false), ("mixamorig:LeftFoot", false), ("LeftAnkle", false)]),
-    ("right_ankle", &[("rfoot", false), ("RightFoot", false), ("mixamorig:RightFoot", false), ("RightAnkle", false)]),
+    (
+        "left_wrist",
+        &[("lhand", false), ("LeftHand", false), ("mixamorig:LeftHand", false), ("LeftWrist", false)],
+    ),
+    (
+        "right_wrist",
+        &[("rhand", false), ("RightHand", false), ("mixamorig:RightHand", false), ("RightWrist", false)],
+    ),
+    (
+        "left_ankle",
+        &[("lfoot", false), ("LeftFoot", false), ("mixamorig:LeftFoot", false), ("LeftAnkle", false)],
+    ),
+    (
+        "right_ankle",
+        &[("rfoot", false), ("RightFoot", false), ("mixamorig:RightFoot", false), ("RightAnkle", false)],
+    ),
     ("root", &[("root", false), ("Hips", false), ("hip", false), ("mixamorig:Hips", false)]),
     ("head", &[("head", true), ("Head", true), ("mixamorig:Head", true)]),
 ];
@@ -56,7 +68,10 @@ fn control_point(skeleton: &Skeleton, name: &str) -> Result<ControlPoint> {
         return Ok(at(joint, true));
     }
     let standard = STANDARD.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-    Err(Error::UnknownPoint { name: name.to_owned(), known: format!("{standard}, a joint's name, or joint.tip") })
+    Err(Error::UnknownPoint {
+        name: name.to_owned(),
+        known: format!("{standard}, a joint's name, or joint.tip"),
+    })
 }
 
 /// Points of a skeleton, with the joints and coordinates that move them worked out once.

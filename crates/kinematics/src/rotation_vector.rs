@@ -38,7 +38,9 @@ pub(crate) fn exp_and_left_jacobian(v: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<
 /// The rotation vector of `rotation` with angle at most π, radians.
 pub fn rotation_log(rotation: &Matrix3<f64>) -> Vector3<f64> {
     // By way of the quaternion: well conditioned at 0 and at π.
-    let q = nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(*rotation));
+    let q = nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(
+        *rotation,
+    ));
     let (w, v) = if q.w < 0.0 { (-q.w, -q.imag()) } else { (q.w, q.imag()) };
     let sin_half = v.norm();
     if sin_half < 1e-12 { v * 2.0 } else { v * (2.0 * sin_half.atan2(w) / sin_half) }

@@ -1,9 +1,11 @@
 use std::fmt;
 
 use nalgebra::{Rotation3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// A coordinate axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Axis {
     /// first axis
     X,
@@ -30,7 +32,8 @@ impl Axis {
 }
 
 /// What a channel moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum ChannelKind {
     /// translation along an axis of the parent, metres
     Translation,

@@ -16,12 +16,14 @@ mod error;
 mod joint;
 mod motion;
 mod points;
+mod record;
 mod skeleton;
 
 pub use error::Error;
 pub use joint::{Axis, Channel, ChannelKind, Joint};
 pub use motion::Motion;
 pub use points::PointTrajectories;
+pub use record::SkeletonRecord;
 pub use skeleton::Skeleton;
 
 /// Result of the constructors of this crate.

@@ -1,1 +1,30 @@
-//! Motion database: invariant windows, neighbour search, the index file.
+//! The motion database: recorded motion at 60 frames a second, in coordinates that know neither where on the
+//! floor the person stands nor which way they face, and exact search in it (method §2, mends 1, 2, 7 and 8).
+//!
+//! - [`MotionDatabase`]: clips, their coordinates, and the index file.
+//! - [`WindowIndex`]: every window `Q_{t,m}` of a database, rotated to principal axes, with exact nearest neighbours.
+//! - [`ControlTable`]: where a session's control points would be in every pose of the database.
+//! - [`start_poses`]: the poses whose control points fit the first frames of a session best.
+
+mod build;
+mod controls;
+mod database;
+mod error;
+mod file;
+mod frame;
+mod search;
+mod start;
+mod window;
+
+pub use build::{Clip, SkeletonSize, resample};
+pub use controls::ControlTable;
+pub use database::{ClipInfo, FRAME_RATE, MotionDatabase};
+pub use error::Error;
+pub use file::FORMAT_VERSION;
+pub use frame::HeadingFrame;
+pub use search::{Neighbour, Query, Scratch};
+pub use start::{StartPose, start_poses};
+pub use window::{FeatureScale, WindowIndex};
+
+/// Result of the fallible functions of this crate.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,1 +1,25 @@
-//! Local regression of the next pose on windows of motion.
+//! Predicting the next pose from the K nearest windows of motion (method §2).
+//!
+//! A [`Predictor`] sees [`Examples`] (inputs: windows and control points; targets: the poses that followed) and a
+//! query, and gives a Gaussian over the next pose: a mean and the factor of a covariance.
+//!
+//! - [`LocalRegression`]: weighted ridge regression in its dual form, leave-one-out residuals (LR eq. 4–10, mended).
+//! - [`NearestExample`]: the successor of the nearest window; the plain baseline.
+//!
+//! ```
+//! use regression::{Examples, LocalRegression, Parameters, Prediction, Predictor};
+//! let (inputs, targets) = (vec![0.0, 1.0, 2.0, 3.0], vec![0.0, 2.0, 4.0, 6.0]);
+//! let examples = Examples { width: 1, dofs: 1, inputs: &inputs, targets: &targets, distances_squared: &[2.2, 0.2, 0.3, 2.3] };
+//! let mut prediction = Prediction::new(4, 1);
+//! let parameters = Parameters { ridge: 1e-6, ..Parameters::default() };
+//! LocalRegression::new(4, 1, 1).predict(&examples, &[1.5], &parameters, &mut prediction);
+//! assert!((prediction.mean[0] - 3.0).abs() < 1e-3);
+//! ```
+
+mod local;
+mod nearest;
+mod prediction;
+
+pub use local::LocalRegression;
+pub use nearest::NearestExample;
+pub use prediction::{Examples, Parameters, Prediction, Predictor, kernel_weights};

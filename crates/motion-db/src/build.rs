@@ -1,0 +1,213 @@
+use std::sync::Arc;
+
+use kinematics::{Kinematics, Parametrisation, rotation_from_angles};
+use model::{Motion, Skeleton};
+use nalgebra::Matrix3;
+
+use crate::database::FRAME_RATE;
+use crate::{ClipInfo, Error, MotionDatabase, Result};
+
+/// Shortest clip that is kept, frames at 60 a second.
+const MIN_FRAMES: usize = 8;
+/// Largest number of poses in one database (bounds memory before it is taken: 250 bytes a pose).
+const MAX_POSES: usize = 8_000_000;
+
+/// A recorded motion to be indexed.
+#[derive(Debug, Clone)]
+pub struct Clip {
+    /// name, `16_15`
+    pub name: String,
+    /// who moved, `16`
+    pub subject: String,
+    /// what they did, empty if unknown
+    pub action: String,
+    /// the motion, at any frame rate
+    pub motion: Motion,
+}
+
+/// Size of a skeleton, by which translations are made comparable.
+pub struct SkeletonSize;
+
+impl SkeletonSize {
+    /// Height of the root above the lowest joint or bone end in the rest pose, metres; 1 if that is not positive.
+    pub fn leg_length(skeleton: &Skeleton) -> f64 {
+        let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
+        let mut state = kinematics.state();
+        kinematics.update(&vec![0.0; skeleton.num_dofs()], &mut state);
+        let lowest = skeleton
+            .joints()
+            .iter()
+            .enumerate()
+            .map(|(j, joint)| state.positions[j].y.min(state.point(j, &joint.tip).y))
+            .fold(f64::INFINITY, f64::min);
+        let length = state.positions[0].y - lowest;
+        if length > 1e-3 { length } else { 1.0 }
+    }
+}
+
+impl MotionDatabase {
+    /// Builds a database: every clip at 60 frames a second, in smooth coordinates about the mean rotation of
+    /// each joint, translations scaled to one leg length. Clips shorter than 8 frames are left out.
+    ///
+    /// # Errors
+    /// If no clip is left, skeletons differ in structure, the root is not free, or there are too many poses.
+    pub fn build(clips: &[Clip]) -> Result<Self> {
+        let Some(first) = clips.first() else {
+            return Err(Error::NoMotion { min_frames: MIN_FRAMES });
+        };
+        let skeleton = first.motion.skeleton().clone();
+        for clip in clips {
+            check_structure(clip, first)?;
+        }
+        let references = mean_rotations(clips);
+        let parametrisation = Parametrisation::smooth(&skeleton, &references)
+            .map_err(|source| Error::Skeleton { clip: first.name.clone(), source })?;
+        let leg_length = clips.iter().map(|c| SkeletonSize::leg_length(c.motion.skeleton())).sum::<f64>()
+            / clips.len() as f64;
+        let mut database = Self {
+            skeleton,
+            references,
+            parametrisation,
+            leg_length,
+            clips: Vec::new(),
+            coordinates: Vec::new(),
+        };
+        for clip in clips {
+            database.add(clip)?;
+        }
+        if database.clips.is_empty() {
+            return Err(Error::NoMotion { min_frames: MIN_FRAMES });
+        }
+        Ok(database)
+    }
+
+    fn add(&mut self, clip: &Clip) -> Result<()> {
+        let dofs = self.num_dofs();
+        let coordinates = resample(&clip.motion, &self.parametrisation);
+        let num_poses = coordinates.len() / dofs;
+        if num_poses < MIN_FRAMES {
+            return Ok(());
+        }
+        let first_pose = self.num_poses();
+        if first_pose + num_poses > MAX_POSES {
+            return Err(Error::TooLarge { poses: first_pose + num_poses, limit: MAX_POSES });
+        }
+        let scale = self.leg_length / SkeletonSize::leg_length(clip.motion.skeleton());
+        for pose in coordinates.chunks_exact(dofs) {
+            let scaled = pose.iter().enumerate().map(|(d, v)| (if d < 3 { v * scale } else { *v }) as f32);
+            self.coordinates.extend(scaled);
+        }
+        self.clips.push(ClipInfo {
+            name: clip.name.clone(),
+            subject: clip.subject.clone(),
+            action: clip.action.clone(),
+            first_pose,
+            num_poses,
+        });
+        Ok(())
+    }
+}
+
+/// Coordinates of a motion at 60 frames a second, shape `[frames, dofs]`, continuous in time. Whole ratios of the
+/// frame rates take every n-th frame; others interpolate linearly in the coordinates.
+pub fn resample(motion: &Motion, parametrisation: &Parametrisation) -> Vec<f64> {
+    let skeleton = motion.skeleton();
+    let dofs = skeleton.num_dofs();
+    let mut all = vec![0.0; motion.values().len()];
+    for frame in 0..motion.num_frames() {
+        let (done, rest) = all.split_at_mut(frame * dofs);
+        let previous = (frame > 0).then(|| &done[(frame - 1) * dofs..]);
+        parametrisation.coordinates_from_pose(skeleton, motion.pose(frame), previous, &mut rest[..dofs]);
+    }
+    let ratio = motion.frame_rate() / FRAME_RATE;
+    let whole = ratio.round();
+    if whole >= 1.0 && (ratio - whole).abs() < 0.01 * whole {
+        return all.chunks_exact(dofs).step_by(whole as usize).flatten().copied().collect();
+    }
+    let duration = (motion.num_frames().saturating_sub(1)) as f64 / motion.frame_rate();
+    let frames = (duration * FRAME_RATE + 1e-9).floor() as usize + 1;
+    let mut out = Vec::with_capacity(frames * dofs);
+    for frame in 0..frames {
+        let at = frame as f64 * ratio;
+        let low = (at.floor() as usize).min(motion.num_frames() - 1);
+        let high = (low + 1).min(motion.num_frames() - 1);
+        let share = at - low as f64;
+        let (a, b) = (&all[low * dofs..][..dofs], &all[high * dofs..][..dofs]);
+        out.extend(a.iter().zip(b).map(|(a, b)| a + share * (b - a)));
+    }
+    out
+}
+
+/// The rotation nearest to the mean of each joint's channel rotations over all clips, shape `[num_joints]`.
+fn mean_rotations(clips: &[Clip]) -> Vec<Matrix3<f64>> {
+    let skeleton: &Arc<Skeleton> = clips[0].motion.skeleton();
+    let mut sums = vec![Matrix3::zeros(); skeleton.num_joints()];
+    for clip in clips {
+        // Every 10th frame is plenty for a mean.
+        for frame in (0..clip.motion.num_frames()).step_by(10) {
+            let pose = clip.motion.pose(frame);
+            for (j, joint) in skeleton.joints().iter().enumerate().filter(|(_, j)| j.num_rotations() == 3) {
+                let channels = &pose[skeleton.dofs(j)];
+                let mut angles = [0.0; 3];
+                for (angle, axis) in angles.iter_mut().zip(&joint.rotation_order) {
+                    let is_it =
+                        |c: &model::Channel| c.kind == model::ChannelKind::Rotation && c.axis == *axis;
+                    *angle = joint.channels.iter().position(is_it).map_or(0.0, |slot| channels[slot]);
+                }
+                sums[j] += rotation_from_angles(&joint.rotation_order, &angles);
+            }
+        }
+    }
+    sums.iter().map(nearest_rotation).collect()
+}
+
+/// The rotation nearest to a matrix (orthogonal Procrustes); identity where the matrix says nothing.
+fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    let svd = matrix.svd(true, true);
+    let (Some(u), Some(vt)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
+    if svd.singular_values.min() <= 1e-9 * svd.singular_values.max().max(1e-300) {
+        return Matrix3::identity();
+    }
+    let mut d = Matrix3::identity();
+    d[(2, 2)] = (u * vt).determinant().signum();
+    u * d * vt
+}
+
+fn check_structure(clip: &Clip, first: &Clip) -> Result<()> {
+    let (skeleton, expected) = (clip.motion.skeleton(), first.motion.skeleton());
+    let mismatch = |difference: String| Error::SkeletonMismatch {
+        clip: clip.name.clone(),
+        first: first.name.clone(),
+        difference,
+    };
+    if !skeleton.same_structure(expected) {
+        return Err(mismatch(structure_difference(skeleton, expected)));
+    }
+    for (a, b) in skeleton.joints().iter().zip(expected.joints()) {
+        if (a.axes.matrix() - b.axes.matrix()).norm() > 1e-3 {
+            return Err(mismatch(format!("the rotation axes of joint {} differ", a.name)));
+        }
+    }
+    Ok(())
+}
+
+/// Says in words where two skeletons differ.
+pub(crate) fn structure_difference(found: &Skeleton, expected: &Skeleton) -> String {
+    if found.num_joints() != expected.num_joints() {
+        return format!("{} joints instead of {}", found.num_joints(), expected.num_joints());
+    }
+    for (a, b) in found.joints().iter().zip(expected.joints()) {
+        if a.name != b.name {
+            return format!("joint {} instead of {}", a.name, b.name);
+        }
+        if a.parent != b.parent {
+            return format!("joint {} hangs from another joint", a.name);
+        }
+        let channels =
+            |j: &model::Joint| j.channels.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+        if channels(a) != channels(b) {
+            return format!("joint {} has channels {} instead of {}", a.name, channels(a), channels(b));
+        }
+    }
+    "rotations are multiplied in another order".to_owned()
+}

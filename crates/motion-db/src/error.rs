@@ -1,0 +1,75 @@
+/// Why a database cannot be built, read or asked.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Nothing to build from.
+    #[error("found no clip of at least {min_frames} frames at 60 frames a second")]
+    NoMotion {
+        /// shortest useful clip
+        min_frames: usize,
+    },
+    /// Clips must share joints and channels.
+    #[error(
+        "clip {clip} has another skeleton than clip {first}: {difference}; expected the same joints and channels"
+    )]
+    SkeletonMismatch {
+        /// the clip that differs
+        clip: String,
+        /// the first clip
+        first: String,
+        /// the first difference found
+        difference: String,
+    },
+    /// A skeleton that cannot move freely.
+    #[error("skeleton of clip {clip}: {source}")]
+    Skeleton {
+        /// the clip
+        clip: String,
+        /// what is wrong
+        source: kinematics::Error,
+    },
+    /// The database would not fit in memory.
+    #[error("found {poses} poses, expected at most {limit}")]
+    TooLarge {
+        /// poses found
+        poses: usize,
+        /// largest number taken
+        limit: usize,
+    },
+    /// The bytes are not an index file.
+    #[error("not a motion database: {found} at byte {offset}, expected {expected}")]
+    File {
+        /// what was found
+        found: String,
+        /// where
+        offset: usize,
+        /// what should have been there
+        expected: String,
+    },
+    /// The file was written by another version.
+    #[error(
+        "motion database has format version {found}, expected {expected}: build it again from its motion files"
+    )]
+    Version {
+        /// version in the file
+        found: u32,
+        /// version of this program
+        expected: u32,
+    },
+    /// The bytes were changed after they were written.
+    #[error("motion database is damaged: its checksum is {found}, expected {expected}")]
+    Checksum {
+        /// checksum of the bytes
+        found: String,
+        /// checksum in the file
+        expected: String,
+    },
+    /// A window of a length that the database cannot have.
+    #[error("window is {found} frames, expected 1 to {max}")]
+    Window {
+        /// length asked for
+        found: usize,
+        /// longest
+        max: usize,
+    },
+}

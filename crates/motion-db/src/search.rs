@@ -1,0 +1,242 @@
+use std::ops::Range;
+
+use crate::{ControlTable, WindowIndex};
+
+/// Number of leading principal features that bound a distance from below.
+pub(crate) const PREFIX: usize = 16;
+/// Rows of a block.
+const LANES: usize = 16;
+
+/// Rows stored in blocks of 16, feature by feature, so that 16 distances grow at once.
+#[derive(Debug, Clone)]
+pub(crate) struct Blocks {
+    dims: usize,
+    data: Vec<f32>,
+}
+
+impl Blocks {
+    /// `fill(row, out)` gives a row's `dims` numbers.
+    pub fn new(rows: usize, dims: usize, mut fill: impl FnMut(usize, &mut [f32])) -> Self {
+        let mut data = vec![0.0; rows.div_ceil(LANES) * LANES * dims];
+        let mut scratch = vec![0.0; dims];
+        for row in 0..rows {
+            fill(row, &mut scratch);
+            let block = &mut data[row / LANES * LANES * dims..][..LANES * dims];
+            for (d, v) in scratch.iter().enumerate() {
+                block[d * LANES + row % LANES] = *v;
+            }
+        }
+        Self { dims, data }
+    }
+
+    pub fn dims(&self) -> usize {
+        self.dims
+    }
+
+    /// Adds the squared, weighted distances of a block's rows to `query`.
+    #[inline]
+    fn add_distances(&self, block: usize, query: &[f32], weights: Option<&[f32]>, sums: &mut [f32; LANES]) {
+        let data = &self.data[block * LANES * self.dims..][..LANES * self.dims];
+        let (columns, _) = data.as_chunks::<LANES>();
+        match weights {
+            None => {
+                for (column, q) in columns.iter().zip(query) {
+                    for lane in 0..LANES {
+                        let d = column[lane] - q;
+                        sums[lane] += d * d;
+                    }
+                }
+            }
+            Some(weights) => {
+                for ((column, q), w) in columns.iter().zip(query).zip(weights) {
+                    for lane in 0..LANES {
+                        let d = column[lane] - q;
+                        sums[lane] += w * d * d;
+                    }
+                }
+            }
+        }
+    }
+
+    fn distance(&self, row: usize, query: &[f32], weights: Option<&[f32]>) -> f32 {
+        let mut sums = [0.0; LANES];
+        self.add_distances(row / LANES, query, weights, &mut sums);
+        sums[row % LANES]
+    }
+
+    /// The numbers of a row.
+    pub fn copy_row(&self, row: usize, out: &mut [f64]) {
+        let block = &self.data[row / LANES * LANES * self.dims..][..LANES * self.dims];
+        for (d, out) in out.iter_mut().enumerate() {
+            *out = f64::from(block[d * LANES + row % LANES]);
+        }
+    }
+}
+
+/// A window found by a search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Neighbour {
+    /// row of the [`WindowIndex`]
+    pub row: usize,
+    /// squared distance, (degrees, centimetres)²
+    pub distance_squared: f64,
+}
+
+/// A question to [`WindowIndex::nearest`].
+#[derive(Debug, Clone, Copy)]
+pub struct Query<'a> {
+    /// window in principal axes, shape `[width]`
+    pub features: &'a [f32],
+    /// control points of the frame sought, shape `[3·points]`, centimetres, with a weight per number (0 where it was
+    /// not measured): they join the distance
+    pub controls: Option<(&'a ControlTable, &'a [f32], &'a [f32])>,
+    /// rows that may not be found (the trial under test), in rising order
+    pub exclude: &'a [Range<usize>],
+    /// rows likely to be near (the successors of the last matches), in rising order: they only speed the search up
+    pub hints: &'a [usize],
+}
+
+/// Memory of a search, kept from one to the next.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    heap: std::collections::BinaryHeap<Candidate>,
+}
+
+/// Ordered by distance, then row: the order in which results come does not depend on how they were found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Candidate {
+    distance: f32,
+    row: u32,
+}
+
+impl Eq for Candidate {}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.distance.total_cmp(&other.distance).then(self.row.cmp(&other.row))
+    }
+}
+
+impl WindowIndex {
+    /// The `k` nearest windows, nearest first: exact, by one scan of the leading principal features with the rest of
+    /// a row read only where these cannot rule it out.
+    pub fn nearest(&self, query: &Query<'_>, k: usize, scratch: &mut Scratch, out: &mut Vec<Neighbour>) {
+        let heap = &mut scratch.heap;
+        heap.clear();
+        out.clear();
+        if k == 0 {
+            return;
+        }
+        let is_excluded = |row: usize| {
+            let after = query.exclude.partition_point(|r| r.end <= row);
+            query.exclude.get(after).is_some_and(|r| r.contains(&row))
+        };
+        let head = &query.features[..self.prefix.dims()];
+        let bounds = |block: usize| {
+            let mut sums = [0.0; LANES];
+            self.prefix.add_distances(block, head, None, &mut sums);
+            if let Some((table, controls, weights)) = query.controls {
+                table.relative.add_distances(block, controls, Some(weights), &mut sums);
+            }
+            sums
+        };
+        // Hints first: they make the bound tight. A first bound only, so that nothing is counted twice.
+        let mut next = 0;
+        for &row in query.hints {
+            if row < next || row >= self.num_rows() || is_excluded(row) {
+                continue;
+            }
+            next = row + 1;
+            let controls = query.controls.map_or(0.0, |(t, c, w)| t.relative.distance(row, c, Some(w)));
+            let start = self.prefix.distance(row, head, None) + controls;
+            let distance = self.full_distance(row, query.features, start, f32::INFINITY);
+            heap.push(Candidate { distance, row: row as u32 });
+            if heap.len() > k {
+                heap.pop();
+            }
+        }
+        let mut limit =
+            if heap.len() == k { heap.peek().map_or(f32::INFINITY, |c| c.distance) } else { f32::INFINITY };
+        heap.clear();
+        // Sums of the hints may be rounded otherwise than those of the scan: leave them room.
+        limit *= 1.0 + 1e-4;
+        let mut full = false;
+        for block in 0..self.num_rows().div_ceil(LANES) {
+            let sums = bounds(block);
+            let lowest = sums.iter().copied().fold(f32::INFINITY, f32::min);
+            if lowest > limit {
+                continue;
+            }
+            for (lane, &bound) in sums.iter().enumerate() {
+                let row = block * LANES + lane;
+                if bound > limit || row >= self.num_rows() || is_excluded(row) {
+                    continue;
+                }
+                let distance = self.full_distance(row, query.features, bound, limit);
+                let candidate = Candidate { distance, row: row as u32 };
+                if full {
+                    if let Some(mut worst) = heap.peek_mut()
+                        && candidate < *worst
+                    {
+                        *worst = candidate;
+                    }
+                } else if distance <= limit {
+                    heap.push(candidate);
+                    full = heap.len() == k;
+                }
+                if full && let Some(worst) = heap.peek() {
+                    limit = limit.min(worst.distance);
+                }
+            }
+        }
+        out.extend(
+            heap.drain().map(|c| Neighbour { row: c.row as usize, distance_squared: f64::from(c.distance) }),
+        );
+        out.sort_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared).then(a.row.cmp(&b.row)));
+    }
+
+    /// Adds the features behind the prefix to `start`; stops (with what it has, above `limit`) once it is too far.
+    #[inline]
+    fn full_distance(&self, row: usize, query: &[f32], start: f32, limit: f32) -> f32 {
+        let skip = self.prefix.dims();
+        let (a, a_rest) = self.features(row)[skip..].as_chunks::<16>();
+        let (b, b_rest) = query[skip..].as_chunks::<16>();
+        let mut distance = start;
+        for (x, y) in a.iter().zip(b) {
+            let mut lanes = [0.0f32; 4];
+            for i in 0..4 {
+                for (lane, sum) in lanes.iter_mut().enumerate() {
+                    let d = x[4 * i + lane] - y[4 * i + lane];
+                    *sum += d * d;
+                }
+            }
+            distance += (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+            if distance > limit {
+                return distance;
+            }
+        }
+        distance + a_rest.iter().zip(b_rest).map(|(x, y)| (x - y) * (x - y)).sum::<f32>()
+    }
+
+    /// As [`Self::nearest`], one row after the other with nothing left out: what the fast search is checked against.
+    pub fn nearest_brute_force(&self, query: &Query<'_>, k: usize) -> Vec<Neighbour> {
+        let mut all: Vec<Neighbour> = (0..self.num_rows())
+            .filter(|row| !query.exclude.iter().any(|r| r.contains(row)))
+            .map(|row| {
+                let controls = query.controls.map_or(0.0, |(t, c, w)| t.relative.distance(row, c, Some(w)));
+                let pairs = self.features(row).iter().zip(query.features);
+                let windows: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
+                Neighbour { row, distance_squared: windows + f64::from(controls) }
+            })
+            .collect();
+        all.sort_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared).then(a.row.cmp(&b.row)));
+        all.truncate(k);
+        all
+    }
+}
