@@ -59,8 +59,9 @@ flock --nonblock 9 || { say "another run uses $data_root, waiting"; flock 9; }
 state=$(mktemp -d /tmp/marey-engine.XXXXXX)
 export DOCKER_HOST=unix://$state/docker.sock
 had_bridge=$([[ -e /sys/class/net/docker0 ]] && echo yes || echo no)
-# In a session of its own: a Ctrl-C at the terminal reaches COMMAND, which still needs the engine to clean up.
-setsid dockerd --data-root "$data_root" --exec-root "$state/exec" --pidfile "$state/pid" \
+# In a session of its own, since COMMAND still needs it after a Ctrl-C at the terminal to clean up; and told to stop
+# when this script dies, even of a SIGKILL.
+setsid setpriv --pdeathsig TERM dockerd --data-root "$data_root" --exec-root "$state/exec" --pidfile "$state/pid" \
     --host "$DOCKER_HOST" --storage-driver overlay2 >"$state/log" 2>&1 9>&- </dev/null &
 engine=$!
 
@@ -89,10 +90,7 @@ say "started an engine of our own, data in $data_root"
 # what a killed run left behind
 { docker container prune --force && docker volume prune --force && docker image prune --force; } >/dev/null
 
-# In the background, so that a signal is handled at once and not after COMMAND.
-"$@" 9>&- <&0 &
-command=$!
+# In the foreground: a Ctrl-C reaches COMMAND too, which takes down what it built before the engine goes.
 status=0
-wait "$command" || status=$?
-# a trapped signal ends `wait` early: `exit` in the trap has run by then
+"$@" 9>&- || status=$?
 exit "$status"
