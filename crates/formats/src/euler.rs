@@ -1,5 +1,7 @@
 //! Euler angles about the coordinate axes in any order.
 
+use std::f64::consts::{PI, TAU};
+
 use model::Axis;
 use nalgebra::{Matrix3, Rotation3};
 
@@ -29,6 +31,25 @@ pub(crate) fn decompose(order: [Axis; 3], rotation: &Rotation3<f64>) -> [f64; 3]
     }
 }
 
+/// As [`decompose`], but of all angles that give the rotation those nearest to `before`, so that a motion's angles
+/// do not jump: both answers are looked at, and whole turns are added.
+pub(crate) fn nearest(order: [Axis; 3], rotation: &Rotation3<f64>, before: [f64; 3]) -> [f64; 3] {
+    let near = |angle: f64, before: f64| angle + TAU * ((before - angle) / TAU).round();
+    let near_all = |angles: [f64; 3]| [0, 1, 2].map(|i| near(angles[i], before[i]));
+    let distance = |angles: &[f64; 3]| (0..3).map(|i| (angles[i] - before[i]).powi(2)).sum::<f64>();
+
+    let [a, b, c] = decompose(order, rotation);
+    if b.cos().abs() < 1e-9 {
+        // only a ± c is known: c stays
+        let without_c = rotation * compose(&order[2..], &[-before[2]]);
+        let [a, b, _] = decompose(order, &without_c);
+        return [near(a, before[0]), near(b, before[1]), before[2]];
+    }
+    let one = near_all([a, b, c]);
+    let other = near_all([a + PI, PI - b, c + PI]);
+    if distance(&other) < distance(&one) { other } else { one }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -56,6 +77,25 @@ mod tests {
                 let rotation = compose(&order, &[0.7, b, -0.2]);
                 let again = compose(&order, &decompose(order, &rotation));
                 assert!((rotation.matrix() - again.matrix()).norm() < 1e-8, "{order:?} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn angles_that_turn_on_do_not_jump() {
+        for order in ORDERS {
+            let mut before = [0.0; 3];
+            for frame in 0..2000 {
+                let t = f64::from(frame) * 0.01;
+                let truth = [t, 2.0 * (0.3 * t).sin(), -0.7 * t];
+                let rotation = compose(&order, &truth);
+                let angles = nearest(order, &rotation, before);
+                let again = compose(&order, &angles);
+                assert!((rotation.matrix() - again.matrix()).norm() < 1e-8);
+                for (angle, before) in angles.iter().zip(before) {
+                    assert!((angle - before).abs() < 0.1, "{order:?} frame {frame}: {before} to {angle}");
+                }
+                before = angles;
             }
         }
     }

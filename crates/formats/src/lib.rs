@@ -14,11 +14,14 @@
 
 pub mod amc;
 pub mod asf;
+pub mod bvh;
 mod error;
 mod euler;
+mod frame_rate;
 mod read;
 mod text;
 
+pub use bvh::Options as BvhOptions;
 pub use error::{Error, Place};
 pub use read::{Read, Warning};
 

@@ -1,4 +1,6 @@
-//! Lines, words and numbers of text formats.
+//! Lines, words, numbers and names of text formats.
+
+use std::collections::HashMap;
 
 /// One line without its end and without blanks around it.
 #[derive(Debug, Clone, Copy)]
@@ -91,22 +93,42 @@ pub(crate) fn push_number(out: &mut String, value: f64) {
     }
 }
 
-/// A name that has no blanks and is not in `taken`, made from `name`; it is then taken.
-pub(crate) fn unique_word(name: &str, taken: &mut std::collections::HashSet<String>) -> String {
-    let mut word: String =
-        name.chars().map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c }).collect();
-    if word.is_empty() {
-        word.push_str("joint");
+/// Names given so far, to keep them apart.
+#[derive(Debug, Default)]
+pub(crate) struct Names {
+    /// the number that the next of that name gets
+    next: HashMap<String, usize>,
+}
+
+impl Names {
+    /// Names that nothing else may have.
+    pub(crate) fn reserved(names: &[&str]) -> Self {
+        Self { next: names.iter().map(|n| ((*n).to_owned(), 2)).collect() }
     }
-    let stem_len = word.len();
-    let mut number = 2;
-    while taken.contains(&word) {
-        word.truncate(stem_len);
-        word.push_str(&format!("_{number}"));
-        number += 1;
+
+    /// `name`, or `name_2`, `name_3`, … if it is taken.
+    pub(crate) fn unique(&mut self, name: &str) -> String {
+        let Some(mut number) = self.next.get(name).copied() else {
+            self.next.insert(name.to_owned(), 2);
+            return name.to_owned();
+        };
+        loop {
+            let candidate = format!("{name}_{number}");
+            number += 1;
+            if !self.next.contains_key(&candidate) {
+                self.next.insert(name.to_owned(), number);
+                self.next.insert(candidate.clone(), 2);
+                return candidate;
+            }
+        }
     }
-    taken.insert(word.clone());
-    word
+
+    /// As `unique`, without blanks and without the characters of `marks`, which mean something in the format.
+    pub(crate) fn unique_word(&mut self, name: &str, marks: &[char]) -> String {
+        let is_bad = |c: char| c.is_whitespace() || c.is_control() || marks.contains(&c);
+        let word = name.replace(is_bad, "_");
+        self.unique(if word.is_empty() { "joint" } else { &word })
+    }
 }
 
 #[cfg(test)]
@@ -128,5 +150,12 @@ mod tests {
             out.push(' ');
         }
         assert_eq!(out, "1.5 0 100 0 -2.25 ");
+    }
+
+    #[test]
+    fn names_that_are_taken_get_a_number() {
+        let mut names = Names::reserved(&["root"]);
+        let given = ["a", "a_2", "a", "a", "root", "b c"].map(|name| names.unique_word(name, &[]));
+        assert_eq!(given, ["a", "a_2", "a_3", "a_4", "root_2", "b_c"]);
     }
 }

@@ -5,13 +5,11 @@
 //! lead from the tip to the child. A joint that both translates and has axes of its own is written as two bones,
 //! of which the first only translates.
 
-use std::collections::HashSet;
-
 use model::{Axis, Channel, ChannelKind, Joint, Skeleton};
 use nalgebra::{Rotation3, Vector3};
 
 use super::CMU_METRES_PER_UNIT;
-use crate::text::unique_word;
+use crate::text::Names;
 
 /// One column of an AMC file.
 #[derive(Debug, Clone, Copy)]
@@ -70,9 +68,8 @@ pub(crate) fn bones(skeleton: &Skeleton) -> Vec<Bone> {
         }
     }
     // joints keep their names where they can; only then come the names of what is added
-    let mut taken = HashSet::from(["root".to_owned(), "begin".to_owned(), "end".to_owned()]);
-    let names: Vec<_> =
-        joints.iter().skip(1).map(|j| unique_word(&without_marks(&j.name), &mut taken)).collect();
+    let mut taken = Names::reserved(&["root", "begin", "end"]);
+    let names: Vec<_> = joints.iter().skip(1).map(|j| taken.unique_word(&j.name, MARKS)).collect();
 
     let mut bones = vec![root(skeleton)];
     let mut bone_of = vec![0; joints.len()];
@@ -83,15 +80,14 @@ pub(crate) fn bones(skeleton: &Skeleton) -> Vec<Bone> {
         let parent_tip = if parent == 0 { Vector3::zeros() } else { bones[parent].vector };
         let gap = joint.offset - parent_tip;
         if gap.norm() > SAME_PLACE_M {
-            bones.push(Bone::fixed(unique_word(&format!("{name}_connector"), &mut taken), parent, gap));
+            bones.push(Bone::fixed(taken.unique(&format!("{name}_connector")), parent, gap));
             parent = bones.len() - 1;
         }
         let (mut columns, axis_order) = columns(joint, skeleton.dofs(index).start);
         let (translations, rotations): (Vec<_>, Vec<_>) =
             columns.iter().partition(|c| c.channel.kind == ChannelKind::Translation);
         if !translations.is_empty() && joint.axes.angle() > 0.0 {
-            let mut slide =
-                Bone::fixed(unique_word(&format!("{name}_slide"), &mut taken), parent, Vector3::zeros());
+            let mut slide = Bone::fixed(taken.unique(&format!("{name}_slide")), parent, Vector3::zeros());
             slide.columns = translations;
             bones.push(slide);
             parent = bones.len() - 1;
@@ -114,10 +110,8 @@ pub(crate) fn bones(skeleton: &Skeleton) -> Vec<Bone> {
     bones
 }
 
-/// Characters with a meaning of their own in the format don't belong in names.
-fn without_marks(name: &str) -> String {
-    name.replace(['#', ':', '('], "_")
-}
+/// Characters with a meaning of their own in the format.
+const MARKS: &[char] = &['#', ':', '('];
 
 fn root(skeleton: &Skeleton) -> Bone {
     let joint = &skeleton.joints()[0];
