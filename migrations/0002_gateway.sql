@@ -94,3 +94,15 @@ ALTER TABLE runs
     ADD CONSTRAINT runs_session FOREIGN KEY (session_id) REFERENCES sessions ON DELETE CASCADE;
 CREATE INDEX runs_of_project ON runs (project_id, id DESC);
 CREATE INDEX runs_of_motion_database ON runs (motion_database_id);
+
+-- Who had a job last, kept after the lease has ended: a run shows its workers.
+ALTER TABLE jobs ADD COLUMN last_worker text;
+CREATE FUNCTION jobs_keep_last_worker() RETURNS trigger LANGUAGE plpgsql AS $$
+BEGIN
+    NEW.last_worker := NEW.leased_by;
+    RETURN NEW;
+END
+$$;
+CREATE TRIGGER jobs_last_worker BEFORE UPDATE OF leased_by ON jobs FOR EACH ROW
+    WHEN (NEW.leased_by IS NOT NULL)
+    EXECUTE FUNCTION jobs_keep_last_worker();

@@ -2,8 +2,9 @@ use std::{sync::Arc, time::Duration};
 
 use sqlx::PgPool;
 use store::Store;
+use tokio_util::sync::CancellationToken;
 
-use crate::{Config, observe::HttpCounts};
+use crate::{Config, changes::Changes, observe::HttpCounts};
 
 /// What every handler shares.
 #[derive(Debug, Clone)]
@@ -15,6 +16,9 @@ pub struct App {
     /// limits of a request
     pub limits: Limits,
     pub(crate) http_counts: Arc<HttpCounts>,
+    pub(crate) changes: Changes,
+    /// streams that would go on end when this is cancelled
+    pub(crate) shutdown: CancellationToken,
 }
 
 /// Limits of a request.
@@ -30,7 +34,7 @@ pub struct Limits {
 
 impl App {
     /// Puts together what handlers share.
-    pub fn new(db: PgPool, store: Store, config: &Config) -> Self {
+    pub fn new(db: PgPool, store: Store, config: &Config, shutdown: CancellationToken) -> Self {
         Self {
             db,
             store,
@@ -40,6 +44,8 @@ impl App {
                 request_timeout: config.request_timeout,
             },
             http_counts: Arc::default(),
+            changes: Changes::default(),
+            shutdown,
         }
     }
 }

@@ -7,6 +7,7 @@
 pub mod access;
 mod answer;
 mod app;
+mod changes;
 mod config;
 mod error;
 mod extract;

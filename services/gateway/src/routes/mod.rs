@@ -1,0 +1,94 @@
+//! The handlers, by noun.
+
+mod databases;
+mod download;
+mod events;
+mod files;
+mod lookup;
+mod me;
+mod operations;
+mod results;
+mod runs;
+mod sessions;
+mod start;
+
+use axum::{
+    Router,
+    extract::{DefaultBodyLimit, Request, State},
+    http::{Method, Uri},
+    middleware::{self, Next},
+    response::{IntoResponse, Response},
+};
+use tower_http::{catch_panic::CatchPanicLayer, trace::TraceLayer};
+use utoipa_axum::{router::OpenApiRouter, routes};
+use utoipa_swagger_ui::SwaggerUi;
+
+use crate::{App, error::Error, extract::MAX_JSON_BYTES, observe, openapi};
+
+/// Every route of the API, with its description.
+pub(crate) fn described() -> OpenApiRouter<App> {
+    OpenApiRouter::with_openapi(openapi::head())
+        .routes(routes!(me::show))
+        .routes(routes!(sessions::create, sessions::list))
+        .routes(routes!(sessions::show, sessions::delete))
+        .routes(routes!(files::list_of_session))
+        .routes(routes!(files::put_in_session, files::get_of_session, files::delete_of_session))
+        .routes(routes!(start::reconstruction, runs::list_of_session))
+        .routes(routes!(databases::create, databases::list))
+        .routes(routes!(databases::show, databases::delete))
+        .routes(routes!(files::list_of_database))
+        .routes(routes!(files::put_in_database, files::delete_of_database))
+        .routes(routes!(start::build))
+        .routes(routes!(runs::list))
+        .routes(routes!(runs::show))
+        .routes(routes!(runs::cancel))
+        .routes(routes!(events::watch))
+        .routes(routes!(results::list))
+        .routes(routes!(results::get))
+        .routes(routes!(operations::healthz))
+        .routes(routes!(operations::readyz))
+        .routes(routes!(operations::metrics))
+}
+
+/// The whole service: API, its description, and what surrounds every request.
+pub fn router(app: App) -> Router {
+    let (router, api) = described().split_for_parts();
+    router
+        .merge(SwaggerUi::new("/docs").url("/openapi.json", openapi::finish(api)))
+        .fallback(no_such_path)
+        .method_not_allowed_fallback(method_not_allowed)
+        .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
+        .layer(middleware::from_fn_with_state(app.clone(), limit_time))
+        .layer(CatchPanicLayer::custom(after_panic))
+        .layer(middleware::from_fn_with_state(app.clone(), observe::count_request))
+        .layer(TraceLayer::new_for_http())
+        .with_state(app)
+}
+
+async fn no_such_path(uri: Uri) -> Error {
+    Error::NoSuchPath(uri.path().to_owned())
+}
+
+async fn method_not_allowed(method: Method) -> Error {
+    Error::MethodNotAllowed(method.to_string())
+}
+
+/// Uploads (the only PUTs) have a limit of their own, on stalling; answers that stream have begun by then.
+async fn limit_time(State(app): State<App>, request: Request, next: Next) -> Response {
+    if request.method() == Method::PUT {
+        return next.run(request).await;
+    }
+    let limit = app.limits.request_timeout;
+    tokio::time::timeout(limit, next.run(request))
+        .await
+        .unwrap_or_else(|_| Error::TimedOut(limit.as_secs()).into_response())
+}
+
+fn after_panic(panic: Box<dyn std::any::Any + Send>) -> Response {
+    let text = panic
+        .downcast_ref::<String>()
+        .cloned()
+        .or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()))
+        .unwrap_or_default();
+    Error::Internal(format!("panic: {text}")).into_response()
+}

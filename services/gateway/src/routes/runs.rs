@@ -1,0 +1,191 @@
+use axum::{Json, extract::State};
+use chrono::{DateTime, Utc};
+use queue::RunId;
+use serde::Serialize;
+use serde_json::Value;
+use sqlx::PgConnection;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::lookup::{self, Lock};
+use crate::{
+    App,
+    access::{Reader, Writer},
+    error::{Error, Result},
+    extract::{Path, Query},
+    page::{Page, PageQuery},
+};
+
+/// A run: what was asked for and how far it is.
+#[derive(Debug, Serialize, ToSchema, sqlx::FromRow)]
+pub(crate) struct Run {
+    /// id
+    pub id: Uuid,
+    /// `reconstruction` or `motion-database`
+    #[schema(example = "reconstruction")]
+    pub kind: String,
+    /// `queued`, `running`, `succeeded`, `failed` or `cancelled`
+    #[schema(example = "running")]
+    pub state: String,
+    /// 0 to 1
+    #[schema(example = 0.4)]
+    pub progress: f64,
+    /// what is being done, in words
+    #[schema(example = "reconstructing frames 600 to 1200")]
+    pub phrase: String,
+    /// why it failed; null unless `failed`
+    pub error: Option<String>,
+    /// the session that it reconstructs
+    pub session_id: Option<Uuid>,
+    /// the motion database that it uses
+    pub motion_database_id: Option<Uuid>,
+    /// everything that determines the result, resolved: files, points, database, parameters of the method
+    pub parameters: Value,
+    /// when it was asked for
+    pub created_at: DateTime<Utc>,
+    /// when its first job was begun
+    pub started_at: Option<DateTime<Utc>>,
+    /// when it ended
+    pub finished_at: Option<DateTime<Utc>>,
+}
+
+/// A run and its jobs.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct RunWithJobs {
+    #[serde(flatten)]
+    run: Run,
+    /// its jobs by kind and state
+    jobs: Vec<JobSummary>,
+}
+
+/// Jobs of one kind in one state.
+#[derive(Debug, Serialize, ToSchema, sqlx::FromRow)]
+pub(crate) struct JobSummary {
+    /// kind of job
+    #[schema(example = "reconstruct-chunk")]
+    kind: String,
+    /// `blocked`, `available`, `running`, `succeeded`, `failed` or `cancelled`
+    #[schema(example = "succeeded")]
+    state: String,
+    /// how many
+    count: i64,
+    /// attempts that they took together
+    attempts: i64,
+    /// the workers that had them last
+    workers: Vec<String>,
+}
+
+/// The columns of [`Run`]. A run's position in lists is its id: time-ordered.
+macro_rules! select_runs {
+    ($rest:literal) => {
+        concat!(
+            "SELECT id, kind, state, progress, phrase, error_message AS error, session_id, motion_database_id,
+                    parameters, created_at, started_at, finished_at FROM runs ",
+            $rest
+        )
+    };
+}
+
+/// The run of that id in the project.
+pub(super) async fn find(db: &mut PgConnection, project_id: Uuid, id: Uuid) -> Result<Run> {
+    sqlx::query_as(select_runs!("WHERE id = $1 AND project_id = $2"))
+        .bind(id)
+        .bind(project_id)
+        .fetch_optional(db)
+        .await?
+        .ok_or_else(|| Error::not_found("run", id))
+}
+
+async fn with_jobs(db: &mut PgConnection, run: Run) -> Result<RunWithJobs> {
+    let jobs = sqlx::query_as(
+        "SELECT kind, state, count(*) AS count, sum(attempts) AS attempts,
+                coalesce(array_agg(DISTINCT last_worker) FILTER (WHERE last_worker IS NOT NULL), '{}') AS workers
+         FROM jobs WHERE run_id = $1 GROUP BY kind, state ORDER BY min(id), state",
+    )
+    .bind(run.id)
+    .fetch_all(db)
+    .await?;
+    Ok(RunWithJobs { run, jobs })
+}
+
+/// List runs
+///
+/// All of the project, newest first.
+#[utoipa::path(
+    get, path = "/v1/runs", tag = "runs", params(PageQuery), responses((status = 200, body = Page<Run>)),
+)]
+pub(super) async fn list(
+    State(app): State<App>,
+    Reader(caller): Reader,
+    Query(page): Query<PageQuery>,
+) -> Result<Json<Page<Run>>> {
+    let rows: Vec<Run> =
+        sqlx::query_as(select_runs!("WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3"))
+            .bind(caller.project_id)
+            .bind(page.before()?)
+            .bind(page.fetch()?)
+            .fetch_all(&app.db)
+            .await?;
+    Ok(Json(Page::of(&page, rows, |row| row.id, |row| row)?))
+}
+
+/// List the runs of a session
+///
+/// Newest first.
+#[utoipa::path(
+    get, path = "/v1/sessions/{session_id}/runs", tag = "runs",
+    params(("session_id" = Uuid, Path,), PageQuery), responses((status = 200, body = Page<Run>)),
+)]
+pub(super) async fn list_of_session(
+    State(app): State<App>,
+    Reader(caller): Reader,
+    Path(session_id): Path<Uuid>,
+    Query(page): Query<PageQuery>,
+) -> Result<Json<Page<Run>>> {
+    let mut db = app.db.acquire().await?;
+    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
+    let rows: Vec<Run> =
+        sqlx::query_as(select_runs!("WHERE session_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3"))
+            .bind(session_id)
+            .bind(page.before()?)
+            .bind(page.fetch()?)
+            .fetch_all(&mut *db)
+            .await?;
+    Ok(Json(Page::of(&page, rows, |row| row.id, |row| row)?))
+}
+
+/// Show a run
+#[utoipa::path(
+    get, path = "/v1/runs/{run_id}", tag = "runs",
+    params(("run_id" = Uuid, Path,)), responses((status = 200, body = RunWithJobs)),
+)]
+pub(super) async fn show(
+    State(app): State<App>,
+    Reader(caller): Reader,
+    Path(run_id): Path<Uuid>,
+) -> Result<Json<RunWithJobs>> {
+    let mut db = app.db.acquire().await?;
+    let run = find(&mut db, caller.project_id, run_id).await?;
+    Ok(Json(with_jobs(&mut db, run).await?))
+}
+
+/// Cancel a run
+///
+/// What waits ends at once, what runs within moments. A run that has ended stays as it is.
+#[utoipa::path(
+    post, path = "/v1/runs/{run_id}/cancel", tag = "runs",
+    params(("run_id" = Uuid, Path,)), responses((status = 200, body = RunWithJobs)),
+)]
+pub(super) async fn cancel(
+    State(app): State<App>,
+    Writer(caller): Writer,
+    Path(run_id): Path<Uuid>,
+) -> Result<Json<RunWithJobs>> {
+    let mut tx = app.db.begin().await?;
+    find(&mut tx, caller.project_id, run_id).await?;
+    queue::cancel_run(&mut tx, RunId(run_id)).await?;
+    let run = find(&mut tx, caller.project_id, run_id).await?;
+    let run = with_jobs(&mut tx, run).await?;
+    tx.commit().await?;
+    Ok(Json(run))
+}

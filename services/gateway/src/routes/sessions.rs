@@ -1,0 +1,137 @@
+use axum::{Json, extract::State, http::StatusCode};
+use queue::RunId;
+use serde::Deserialize;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::lookup::{self, Lock, Session};
+use crate::{
+    App,
+    access::{Reader, Writer},
+    answer::Answer,
+    error::{Error, Result},
+    extract::{Path, Posted, Query},
+    names,
+    page::{Page, PageQuery},
+    upload::uninterrupted,
+};
+
+/// Most tags of a session.
+const MAX_TAGS: usize = 32;
+
+/// A session to be made.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NewSession {
+    /// what people call it; 1 to 200 characters
+    #[schema(example = "walk, take 3")]
+    name: String,
+    /// words to find it by; at most 32
+    #[serde(default)]
+    tags: Vec<String>,
+}
+
+/// Make a session
+#[utoipa::path(
+    post, path = "/v1/sessions", tag = "sessions", request_body = NewSession,
+    params(("Idempotency-Key" = Option<String>, Header, description = "the same key gives the same answer for a day")),
+    responses((status = 201, body = Session, headers(("Location" = String, description = "the session")))),
+)]
+pub(super) async fn create(
+    State(app): State<App>,
+    Writer(caller): Writer,
+    Posted { body, request }: Posted<NewSession>,
+) -> Result<Answer> {
+    names::check_session_name(&body.name)?;
+    if body.tags.len() > MAX_TAGS {
+        return Err(Error::Unprocessable(format!("there are {} tags, expected at most {MAX_TAGS}", body.tags.len())));
+    }
+    body.tags.iter().try_for_each(|tag| names::check_session_name(tag))?;
+    let mut tx = app.db.begin().await?;
+    if let Some(answer) = request.replay(&mut tx, caller.project_id).await? {
+        return Ok(answer);
+    }
+    let session: Session = sqlx::query_as(
+        "INSERT INTO sessions (id, project_id, name, tags) VALUES ($1, $2, $3, $4)
+         RETURNING id, name, tags, created_at",
+    )
+    .bind(Uuid::now_v7())
+    .bind(caller.project_id)
+    .bind(&body.name)
+    .bind(&body.tags)
+    .fetch_one(&mut *tx)
+    .await?;
+    let answer = Answer::created(format!("/v1/sessions/{}", session.id), &session)?;
+    request.commit(tx, caller.project_id, answer).await
+}
+
+/// List sessions
+///
+/// Newest first.
+#[utoipa::path(
+    get, path = "/v1/sessions", tag = "sessions", params(PageQuery),
+    responses((status = 200, body = Page<Session>)),
+)]
+pub(super) async fn list(
+    State(app): State<App>,
+    Reader(caller): Reader,
+    Query(page): Query<PageQuery>,
+) -> Result<Json<Page<Session>>> {
+    let rows: Vec<Session> = sqlx::query_as(
+        "SELECT id, name, tags, created_at FROM sessions
+         WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3",
+    )
+    .bind(caller.project_id)
+    .bind(page.before()?)
+    .bind(page.fetch()?)
+    .fetch_all(&app.db)
+    .await?;
+    Ok(Json(Page::of(&page, rows, |row| row.id, |row| row)?))
+}
+
+/// Show a session
+#[utoipa::path(
+    get, path = "/v1/sessions/{session_id}", tag = "sessions",
+    params(("session_id" = Uuid, Path,)), responses((status = 200, body = Session)),
+)]
+pub(super) async fn show(
+    State(app): State<App>,
+    Reader(caller): Reader,
+    Path(id): Path<Uuid>,
+) -> Result<Json<Session>> {
+    let mut db = app.db.acquire().await?;
+    Ok(Json(lookup::session(&mut db, caller.project_id, id, Lock::None).await?))
+}
+
+/// Delete a session
+///
+/// With its files, runs and their results. Refused (409) while a run of it goes on: cancel that first.
+#[utoipa::path(
+    delete, path = "/v1/sessions/{session_id}", tag = "sessions",
+    params(("session_id" = Uuid, Path,)), responses((status = 204)),
+)]
+pub(super) async fn delete(
+    State(app): State<App>,
+    Writer(caller): Writer,
+    Path(id): Path<Uuid>,
+) -> Result<StatusCode> {
+    uninterrupted(async move {
+        let mut tx = app.db.begin().await?;
+        lookup::session(&mut tx, caller.project_id, id, Lock::Update).await?;
+        let active = lookup::active_runs_of_session(&mut tx, id).await?;
+        if active > 0 {
+            return Err(Error::Conflict(format!("{active} runs of this session go on; cancel them first")));
+        }
+        let runs: Vec<RunId> =
+            sqlx::query_scalar("SELECT id FROM runs WHERE session_id = $1").bind(id).fetch_all(&mut *tx).await?;
+        sqlx::query("DELETE FROM sessions WHERE id = $1").bind(id).execute(&mut *tx).await?;
+        tx.commit().await?;
+        // nothing names these objects any more
+        app.store.remove_all(&store::key::session_prefix(caller.project_id, id)).await?;
+        for run in runs {
+            app.store.remove_all(&store::key::run_prefix(run.0)).await?;
+        }
+        Ok(StatusCode::NO_CONTENT)
+    })
+    .await
+}

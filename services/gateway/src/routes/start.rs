@@ -1,0 +1,261 @@
+//! Starting runs: parameters are resolved, then the run and its first job are inserted in one transaction.
+
+use std::collections::BTreeMap;
+
+use axum::extract::State;
+use queue::{NewJob, NewRun, ProjectId};
+use serde::Deserialize;
+use serde_json::{Map, Value};
+use sqlx::PgConnection;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::{
+    files,
+    lookup::{self, Latest, Lock, MotionDatabase},
+    runs::{self, Run},
+};
+use crate::{
+    App,
+    access::Writer,
+    answer::Answer,
+    error::{Error, Result},
+    extract::{Path, Posted},
+    jobs::{
+        BUILD_MOTION_DATABASE, BuildMotionDatabase, InputFile, MotionDatabaseFile, MotionDatabaseName, PLAN_SPARSE,
+        PlanSparse,
+    },
+};
+
+/// Most control points, and most names in a mapping.
+const MAX_POINTS: usize = 256;
+
+/// A reconstruction to be run. What is left out has its default; the run shows everything resolved.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NewReconstruction {
+    /// the motion database to learn from: id, `name` (its latest version that is ready) or `name@version`
+    #[schema(example = "walks")]
+    motion_database: String,
+    /// control points to use, by name; all that the files have when left out
+    #[serde(default)]
+    #[schema(example = json!(["left_wrist", "right_wrist", "left_ankle", "right_ankle"]))]
+    points: Vec<String>,
+    /// name in the file -> name of a control point or joint, for files with marker names of their own
+    #[serde(default)]
+    #[schema(example = json!({"LWRA": "left_wrist"}))]
+    mapping: BTreeMap<String, String>,
+    /// `local-regression`, or `nearest` for the nearest-example baseline
+    #[schema(example = "local-regression")]
+    method: Option<String>,
+    /// frames of history that the regression looks at
+    #[schema(example = 2)]
+    window: Option<u32>,
+    /// neighbours that the regression learns from
+    #[schema(example = 64)]
+    neighbours: Option<u32>,
+    /// further parameters of the method, by name
+    #[serde(default)]
+    parameters: Map<String, Value>,
+}
+
+impl NewReconstruction {
+    /// All parameters of the method, those left out with their defaults.
+    fn resolve(&self) -> Result<Value> {
+        let given = self.given()?;
+        let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
+        let parameters: sparse::Parameters =
+            serde_json::from_value(Value::Object(given.clone())).map_err(|error| refuse(&error))?;
+        parameters.check().map_err(|error| refuse(&error))?;
+        let resolved = serde_json::to_value(&parameters)?;
+        if let Some(unknown) = given.keys().find(|key| resolved.get(key.as_str()).is_none()) {
+            let known: Vec<&str> =
+                resolved.as_object().into_iter().flat_map(Map::keys).map(String::as_str).collect();
+            return Err(refuse(&format_args!("{unknown:?} is not one of {}", known.join(", "))));
+        }
+        Ok(resolved)
+    }
+
+    fn given(&self) -> Result<Map<String, Value>> {
+        let mut given = self.parameters.clone();
+        let named = [
+            ("method", self.method.clone().map(Value::from)),
+            ("window", self.window.map(Value::from)),
+            ("neighbours", self.neighbours.map(Value::from)),
+        ];
+        for (name, value) in named {
+            if let Some(value) = value
+                && given.insert(name.into(), value).is_some()
+            {
+                return Err(Error::Unprocessable(format!("{name} is given twice")));
+            }
+        }
+        Ok(given)
+    }
+}
+
+/// Reconstruct a session's motion
+///
+/// Full-body motion from the session's control points. Answers at once (202) with the run; watch it at
+/// `/v1/runs/{run_id}/events`.
+#[utoipa::path(
+    post, path = "/v1/sessions/{session_id}/runs", tag = "runs", request_body = NewReconstruction,
+    params(
+        ("session_id" = Uuid, Path,),
+        ("Idempotency-Key" = Option<String>, Header, description = "the same key gives the same answer for a day"),
+    ),
+    responses((status = 202, body = Run, headers(("Location" = String, description = "the run")))),
+)]
+pub(super) async fn reconstruction(
+    State(app): State<App>,
+    Writer(caller): Writer,
+    Path(session_id): Path<Uuid>,
+    Posted { body, request }: Posted<NewReconstruction>,
+) -> Result<Answer> {
+    let project_id = caller.project_id;
+    let parameters = body.resolve()?;
+    if body.points.len().max(body.mapping.len()) > MAX_POINTS {
+        return Err(Error::Unprocessable(format!("expected at most {MAX_POINTS} points")));
+    }
+    let mut tx = app.db.begin().await?;
+    if let Some(answer) = request.replay(&mut tx, project_id).await? {
+        return Ok(answer);
+    }
+    let session = lookup::session(&mut tx, project_id, session_id, Lock::Share).await?;
+    let database =
+        lookup::motion_database(&mut tx, project_id, &body.motion_database, Latest::Ready, Lock::Share).await?;
+    let plan = PlanSparse {
+        session_id,
+        session_name: session.name,
+        motion_database: ready(&database)?,
+        files: inputs(&mut tx, session_id).await?,
+        points: body.points,
+        mapping: body.mapping,
+        parameters,
+    };
+    if !plan.files.iter().any(|file| file.role == "control-points") {
+        return Err(Error::Unprocessable(
+            "the session has no control points; upload a .csv, .trc or .c3d file first".into(),
+        ));
+    }
+    let new = NewRun {
+        project_id: ProjectId(project_id),
+        kind: "reconstruction",
+        session_id: Some(session_id),
+        parameters: serde_json::to_value(&plan)?,
+    };
+    let run_id = start(&mut tx, &new, PLAN_SPARSE).await?;
+    sqlx::query("UPDATE runs SET motion_database_id = $2 WHERE id = $1")
+        .bind(run_id)
+        .bind(database.id)
+        .execute(&mut *tx)
+        .await?;
+    let run = runs::find(&mut tx, project_id, run_id).await?;
+    let answer = Answer::accepted(format!("/v1/runs/{run_id}"), &run)?;
+    request.commit(tx, project_id, answer).await
+}
+
+/// Nothing is asked of a build.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NewBuild {}
+
+/// Build a motion database
+///
+/// From the files uploaded to it, which are fixed from then on. Answers at once (202) with the run.
+#[utoipa::path(
+    post, path = "/v1/motion-databases/{motion_database}/build", tag = "motion databases",
+    params(
+        ("motion_database" = String, Path, description = "id, name or name@version"),
+        ("Idempotency-Key" = Option<String>, Header, description = "the same key gives the same answer for a day"),
+    ),
+    responses((status = 202, body = Run, headers(("Location" = String, description = "the run")))),
+)]
+pub(super) async fn build(
+    State(app): State<App>,
+    Writer(caller): Writer,
+    Path(which): Path<String>,
+    Posted { body: NewBuild {}, request }: Posted<NewBuild>,
+) -> Result<Answer> {
+    let project_id = caller.project_id;
+    let mut tx = app.db.begin().await?;
+    if let Some(answer) = request.replay(&mut tx, project_id).await? {
+        return Ok(answer);
+    }
+    let database = lookup::motion_database(&mut tx, project_id, &which, Latest::Any, Lock::Update).await?;
+    if !matches!(database.state.as_str(), "open" | "failed") {
+        return Err(Error::Conflict(format!(
+            "motion database {}@{} is {}; make a new version to build another",
+            database.name, database.version, database.state
+        )));
+    }
+    let files = inputs(&mut tx, database.id).await?;
+    if files.is_empty() {
+        return Err(Error::Unprocessable(format!(
+            "motion database {}@{} has no files; upload an archive of ASF and AMC or of BVH files first",
+            database.name, database.version
+        )));
+    }
+    let payload = BuildMotionDatabase {
+        motion_database: MotionDatabaseName {
+            id: database.id,
+            name: database.name.clone(),
+            version: database.version,
+        },
+        files,
+    };
+    let new = NewRun {
+        project_id: ProjectId(project_id),
+        kind: "motion-database",
+        session_id: None,
+        parameters: serde_json::to_value(&payload)?,
+    };
+    let run_id = start(&mut tx, &new, BUILD_MOTION_DATABASE).await?;
+    sqlx::query("UPDATE motion_databases SET build_run_id = $2 WHERE id = $1")
+        .bind(database.id)
+        .bind(run_id)
+        .execute(&mut *tx)
+        .await?;
+    let run = runs::find(&mut tx, project_id, run_id).await?;
+    let answer = Answer::accepted(format!("/v1/runs/{run_id}"), &run)?;
+    request.commit(tx, project_id, answer).await
+}
+
+/// The run and its first job, whose payload is the run's parameters.
+async fn start(db: &mut PgConnection, run: &NewRun<'_>, first_job: &str) -> Result<Uuid> {
+    let run_id = queue::enqueue_run(db, run).await?;
+    queue::enqueue(db, &NewJob::new(run_id, first_job, run.parameters.clone())).await?;
+    Ok(run_id.0)
+}
+
+async fn inputs(db: &mut PgConnection, owner: Uuid) -> Result<Vec<InputFile>> {
+    files::of_owner(db, owner)
+        .await?
+        .into_iter()
+        .map(|file| {
+            Ok(InputFile {
+                name: file.name,
+                role: file.role,
+                store_key: file.store_key,
+                bytes: u64::try_from(file.bytes).map_err(|e| Error::Internal(e.to_string()))?,
+                blake3: file.blake3,
+            })
+        })
+        .collect()
+}
+
+fn ready(database: &MotionDatabase) -> Result<MotionDatabaseFile> {
+    match (&database.store_key, &database.blake3) {
+        (Some(store_key), Some(blake3)) => Ok(MotionDatabaseFile {
+            id: database.id,
+            name: database.name.clone(),
+            version: database.version,
+            store_key: store_key.clone(),
+            blake3: blake3.clone(),
+        }),
+        _ => Err(Error::Conflict(format!(
+            "motion database {}@{} is {}, expected ready",
+            database.name, database.version, database.state
+        ))),
+    }
+}
