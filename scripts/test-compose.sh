@@ -26,7 +26,7 @@ scripts/docker-base-images.sh "$MAREY_DEBIAN" "$postgres"
 # A name and a port of its own: another stack on this machine is not touched.
 project=marey-test-$$
 export MAREY_VERSION=test MAREY_PORT=0
-MAREY_BOOTSTRAP_KEY=marey_$(od -An -N16 -tx1 /dev/urandom | tr -d ' \n')
+MAREY_BOOTSTRAP_KEY=mk_$(od -An -N16 -tx1 /dev/urandom | tr -d ' \n')
 export MAREY_BOOTSTRAP_KEY
 if docker compose version >/dev/null 2>&1; then compose=(docker compose); else compose=(docker-compose); fi
 compose+=(--project-name "$project" --file deploy/compose.yaml)
