@@ -1,1 +1,21 @@
-//! Configuration, telemetry, health and shutdown shared by the services.
+//! What every service process shares: configuration, telemetry, health, shutdown, and the frame that runs
+//! a gRPC server beside a worker loop.
+//!
+//! A service reads a [`Config`] once, calls [`telemetry::start`], and hands its gRPC routes and its worker
+//! to [`start`]. Tests and `marey up` do the same in one process.
+
+mod cache;
+pub mod compute;
+pub mod config;
+pub mod database;
+mod error;
+mod health;
+pub mod objects;
+mod server;
+pub mod shutdown;
+pub mod telemetry;
+
+pub use cache::Cache;
+pub use config::Config;
+pub use error::Error;
+pub use server::{Parts, Running, start};

@@ -96,6 +96,11 @@ pub fn run_prefix(run: Uuid) -> Key {
     Key(format!("runs/{run}"))
 }
 
+/// Prefix of everything one job of a run wrote.
+pub fn job_prefix(run: Uuid, job: i64) -> Key {
+    Key(format!("runs/{run}/{job}"))
+}
+
 /// Prefix of everything uploaded to a session.
 pub fn session_prefix(project: Uuid, session: Uuid) -> Key {
     Key(format!("files/{project}/{session}"))

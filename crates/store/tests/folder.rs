@@ -163,3 +163,19 @@ async fn a_store_that_is_a_file_or_a_bucket_is_refused_with_its_name() {
     let error = Store::open(&"s3://bucket/x".parse().unwrap()).unwrap_err().to_string();
     assert!(error.contains("s3://bucket/x") && error.contains("no S3 backend"), "{error}");
 }
+
+#[tokio::test]
+async fn what_earlier_attempts_left_is_removed_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = open(folder.path());
+    let run = uuid::Uuid::nil();
+    for (job, lease) in [(7, 1), (7, 2), (7, 10), (70, 1), (8, 1)] {
+        let key = store::key::artefact(run, job, lease, "chunk.bin").unwrap();
+        store.put(&key, Bytes::from_static(b"x")).await.unwrap();
+    }
+    assert_eq!(store.remove_earlier_leases(run, 7, 10).await.unwrap(), 2);
+    let left = files_in(folder.path())
+        .into_iter()
+        .map(|f| f.split('/').skip(2).take(2).collect::<Vec<_>>().join("/"));
+    assert_eq!(left.collect::<Vec<_>>(), ["7/10", "70/1", "8/1"]);
+}

@@ -1,0 +1,15 @@
+//! Computation away from the async threads.
+
+use tokio::task::JoinError;
+
+/// Runs `work` on a thread that may block, and waits for it. A panic in it goes on here, where the worker loop or
+/// the gRPC server catches it.
+pub async fn run<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
+    let span = tracing::Span::current();
+    match tokio::task::spawn_blocking(move || span.in_scope(work)).await.map_err(JoinError::try_into_panic) {
+        Ok(value) => value,
+        Err(Ok(panic)) => std::panic::resume_unwind(panic),
+        // The runtime is being dropped, and this task with it: never continue.
+        Err(Err(_)) => std::future::pending().await,
+    }
+}

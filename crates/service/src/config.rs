@@ -1,0 +1,246 @@
+//! Configuration: one struct per concern, read once at start.
+//!
+//! | variable | default | meaning |
+//! |---|---|---|
+//! | `MAREY_DATABASE_URL` | – | PostgreSQL, `postgres://user@host/name` |
+//! | `MAREY_DATABASE_CONNECTIONS` | 8 | most connections of this process, beside three of the worker loop |
+//! | `MAREY_STORE` | – | object store: a folder, `file://…` or `s3://bucket/prefix` |
+//! | `MAREY_LISTEN` | by service | address of the gRPC server |
+//! | `MAREY_WORKER_CONCURRENCY` | number of cores | jobs at once; 0 serves gRPC only |
+//! | `MAREY_WORKER_NAME` | service, host, process id | how this process shows in the queue and in `run.json` |
+//! | `MAREY_SHUTDOWN_GRACE_SECS` | 20 | how long calls and jobs may go on after a signal |
+//! | `MAREY_DATABASE_CACHE_BYTES` | 2 GiB | motion databases kept in memory |
+//! | `MAREY_MAX_OBJECT_BYTES` | 1 GiB | largest object read into memory |
+//! | `MAREY_MAX_INPUT_BYTES` | 8 GiB | unpacked motion files of one motion database |
+//! | `MAREY_LOG` | `info` | filter: `info`, `warn,motion_index=debug`, … |
+//! | `MAREY_LOG_FORMAT` | `pretty` | `pretty` or `json` |
+
+use crate::{Error, telemetry::LogFormat};
+use std::{net::SocketAddr, str::FromStr, time::Duration};
+use store::Location;
+
+/// Everything a service with a gRPC server and a worker needs to know.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// PostgreSQL.
+    pub database: DatabaseConfig,
+    /// Where objects are.
+    pub store: Location,
+    /// The gRPC server.
+    pub grpc: GrpcConfig,
+    /// The worker loop.
+    pub worker: WorkerConfig,
+    /// Bounds on memory.
+    pub memory: MemoryConfig,
+}
+
+/// How to reach PostgreSQL.
+#[derive(Debug, Clone)]
+pub struct DatabaseConfig {
+    /// `postgres://user:password@host:port/name`; `?host=/path` for a socket.
+    pub url: String,
+    /// Most connections of this process. Default 8: jobs hold none while they work, so a few serve many.
+    pub max_connections: u32,
+    /// How long to wait for a free connection. 10 s: longer than any transaction of ours.
+    pub acquire_timeout: Duration,
+}
+
+/// The gRPC server.
+#[derive(Debug, Clone)]
+pub struct GrpcConfig {
+    /// Address to listen on; port 0 takes a free one. The default is this machine only.
+    pub listen: SocketAddr,
+    /// How long calls may go on after shutdown was asked for; default 20 s, below Kubernetes' 30.
+    pub shutdown_grace: Duration,
+}
+
+/// The worker loop.
+#[derive(Debug, Clone)]
+pub struct WorkerConfig {
+    /// How this process shows in the queue and in `run.json`; default is made of service, host and process id.
+    pub name: Option<String>,
+    /// Jobs at once. Default: number of cores, as jobs are computation. 0: claim none.
+    pub concurrency: usize,
+    /// How long running jobs may go on after shutdown was asked for, before they are handed back.
+    pub shutdown_grace: Duration,
+}
+
+impl WorkerConfig {
+    /// The configured name, or `service@host/pid`.
+    pub fn name(&self, service: &str) -> String {
+        self.name.clone().unwrap_or_else(|| {
+            let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+            format!("{service}@{}/{}", host.trim(), std::process::id())
+        })
+    }
+
+    /// A worker loop on `pool` that is set up as configured; `None` if it is to claim nothing.
+    pub fn builder(&self, service: &str, pool: &sqlx::PgPool) -> Option<queue::WorkerBuilder> {
+        (self.concurrency > 0).then(|| {
+            queue::Worker::builder(pool.clone())
+                .name(self.name(service))
+                .concurrency(self.concurrency)
+                .grace(self.shutdown_grace)
+        })
+    }
+}
+
+/// Bounds on memory.
+#[derive(Debug, Clone)]
+pub struct MemoryConfig {
+    /// Motion databases kept for queries and jobs, bytes as counted in memory. Default 2 GiB.
+    pub database_cache_bytes: u64,
+    /// Largest object that is read into memory, bytes. Default 1 GiB: two hours of 120 fps AMC are 400 MB.
+    pub max_object_bytes: u64,
+    /// Unpacked motion files of one motion database, bytes. Default 8 GiB: all of the CMU library is 5.
+    pub max_input_bytes: u64,
+}
+
+const GIB: u64 = 1 << 30;
+
+impl Config {
+    /// The defaults, for a database, a store and an address.
+    pub fn new(database_url: impl Into<String>, store: Location, listen: SocketAddr) -> Self {
+        let grace = Duration::from_secs(20);
+        Self {
+            database: DatabaseConfig {
+                url: database_url.into(),
+                max_connections: 8,
+                acquire_timeout: Duration::from_secs(10),
+            },
+            store,
+            grpc: GrpcConfig { listen, shutdown_grace: grace },
+            worker: WorkerConfig {
+                name: None,
+                concurrency: std::thread::available_parallelism().map_or(1, usize::from),
+                shutdown_grace: grace,
+            },
+            memory: MemoryConfig {
+                database_cache_bytes: 2 * GIB,
+                max_object_bytes: GIB,
+                max_input_bytes: 8 * GIB,
+            },
+        }
+    }
+
+    /// Reads the configuration from variables; `default_listen` is the service's own port.
+    ///
+    /// # Errors
+    /// [`Error::NotSet`] or [`Error::BadValue`], naming the variable.
+    pub fn from_variables(vars: &Variables<'_>, default_listen: SocketAddr) -> Result<Self, Error> {
+        let url = vars.required("MAREY_DATABASE_URL", "a PostgreSQL URL")?;
+        let store = vars.required("MAREY_STORE", "a folder or URL for objects")?;
+        let store = vars.parse("MAREY_STORE", &store)?;
+        let mut config = Self::new(url, store, default_listen);
+        vars.set("MAREY_DATABASE_CONNECTIONS", &mut config.database.max_connections)?;
+        vars.set("MAREY_LISTEN", &mut config.grpc.listen)?;
+        vars.set("MAREY_WORKER_CONCURRENCY", &mut config.worker.concurrency)?;
+        config.worker.name = vars.get("MAREY_WORKER_NAME");
+        let mut grace_secs = config.grpc.shutdown_grace.as_secs();
+        vars.set("MAREY_SHUTDOWN_GRACE_SECS", &mut grace_secs)?;
+        config.grpc.shutdown_grace = Duration::from_secs(grace_secs);
+        config.worker.shutdown_grace = Duration::from_secs(grace_secs);
+        vars.set("MAREY_DATABASE_CACHE_BYTES", &mut config.memory.database_cache_bytes)?;
+        vars.set("MAREY_MAX_OBJECT_BYTES", &mut config.memory.max_object_bytes)?;
+        vars.set("MAREY_MAX_INPUT_BYTES", &mut config.memory.max_input_bytes)?;
+        Ok(config)
+    }
+}
+
+/// What is logged, and how.
+#[derive(Debug, Clone, Default)]
+pub struct TelemetryConfig {
+    /// Which spans and events, in the syntax of `tracing`; default `info`.
+    pub filter: Option<String>,
+    /// For people or for machines.
+    pub format: LogFormat,
+}
+
+impl TelemetryConfig {
+    /// Reads `MAREY_LOG` and `MAREY_LOG_FORMAT`.
+    ///
+    /// # Errors
+    /// [`Error::BadValue`].
+    pub fn from_variables(vars: &Variables<'_>) -> Result<Self, Error> {
+        let mut config = Self { filter: vars.get("MAREY_LOG"), format: LogFormat::default() };
+        vars.set("MAREY_LOG_FORMAT", &mut config.format)?;
+        Ok(config)
+    }
+}
+
+/// Where settings come from: the environment, or a map in tests.
+pub struct Variables<'a> {
+    read: &'a dyn Fn(&str) -> Option<String>,
+}
+
+impl<'a> Variables<'a> {
+    /// Reads through `read`; [`environment`] is the usual one. An empty value counts as not set.
+    pub fn new(read: &'a dyn Fn(&str) -> Option<String>) -> Self {
+        Self { read }
+    }
+
+    fn get(&self, name: &str) -> Option<String> {
+        (self.read)(name).filter(|value| !value.is_empty())
+    }
+
+    fn required(&self, name: &'static str, expected: &'static str) -> Result<String, Error> {
+        self.get(name).ok_or(Error::NotSet { name, expected })
+    }
+
+    fn parse<T: FromStr<Err: std::fmt::Display>>(&self, name: &'static str, text: &str) -> Result<T, Error> {
+        text.parse().map_err(|e: T::Err| Error::BadValue {
+            name,
+            found: text.to_owned(),
+            expected: format!("a valid value: {e}"),
+        })
+    }
+
+    fn set<T: FromStr<Err: std::fmt::Display>>(&self, name: &'static str, to: &mut T) -> Result<(), Error> {
+        if let Some(text) = self.get(name) {
+            *to = self.parse(name, &text)?;
+        }
+        Ok(())
+    }
+}
+
+/// Reads one variable of the process environment.
+pub fn environment(name: &str) -> Option<String> {
+    std::env::var(name).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(pairs: &[(&str, &str)]) -> Result<Config, Error> {
+        let get = |name: &str| pairs.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_owned());
+        Config::from_variables(&Variables::new(&get), SocketAddr::from(([127, 0, 0, 1], 50051)))
+    }
+
+    #[test]
+    fn what_is_not_set_has_its_default() {
+        let config = read(&[("MAREY_DATABASE_URL", "postgres:///m"), ("MAREY_STORE", "/o")]).unwrap();
+        assert_eq!(config.grpc.listen.port(), 50051);
+        assert_eq!(config.store, Location::folder("/o"));
+        assert_eq!(config.database.max_connections, 8);
+        assert_eq!(config.worker.name, None);
+    }
+
+    #[test]
+    fn a_bad_value_is_refused_with_its_name() {
+        let base = [("MAREY_DATABASE_URL", "postgres:///m"), ("MAREY_STORE", "/o")];
+        for (name, bad) in [
+            ("MAREY_LISTEN", "localhost"),
+            ("MAREY_WORKER_CONCURRENCY", "-1"),
+            ("MAREY_SHUTDOWN_GRACE_SECS", "soon"),
+            ("MAREY_STORE", "ftp://x"),
+        ] {
+            let mut pairs = vec![(name, bad)];
+            pairs.extend(base);
+            let message = read(&pairs).unwrap_err().to_string();
+            assert!(message.contains(name) && message.contains(bad), "{message}");
+        }
+        let message = read(&[("MAREY_STORE", "/o"), ("MAREY_DATABASE_URL", "")]).unwrap_err().to_string();
+        assert_eq!(message, "MAREY_DATABASE_URL is not set: expected a PostgreSQL URL");
+    }
+}

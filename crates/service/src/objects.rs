@@ -1,0 +1,86 @@
+//! Objects as jobs see them: uploads read, artefacts written, the store's errors told apart.
+
+use bytes::Bytes;
+use queue::{Artefact, JobContext, JobError};
+use std::str::FromStr;
+use store::{Error, Key, Store, key};
+
+/// An object that a job is told to read.
+#[derive(Debug, Clone, Copy)]
+pub struct Input<'a> {
+    /// What the user calls it.
+    pub name: &'a str,
+    /// Where it is in the store.
+    pub store_key: &'a str,
+    /// BLAKE3 of its content, hex.
+    pub blake3: &'a str,
+}
+
+/// Reads an object whole and checks it.
+///
+/// # Errors
+/// Gives up if it is gone or larger than `max_bytes`; to be tried again if the store failed or the content is not
+/// what was written.
+pub async fn read(store: &Store, input: Input<'_>, max_bytes: u64) -> Result<Bytes, JobError> {
+    let name = input.name;
+    let key = Key::from_str(input.store_key)
+        .map_err(|e| JobError::give_up(format!("{name} has no place in the store"), e))?;
+    store.get_checked(&key, input.blake3, max_bytes).await.map_err(|error| match &error {
+        Error::NotFound { .. } => JobError::give_up(format!("{name} is not in the store any more"), error),
+        Error::TooLarge { limit_bytes, .. } => JobError::give_up(
+            format!("{name} is larger than the {limit_bytes} bytes that a job reads"),
+            error,
+        ),
+        _ => JobError::retry(error),
+    })
+}
+
+/// Writes an artefact of the job under its own lease.
+///
+/// # Errors
+/// To be tried again if the store failed.
+pub async fn write(
+    store: &Store,
+    job: &JobContext,
+    name: &str,
+    media_type: &str,
+    content: impl Into<Bytes>,
+) -> Result<Artefact, JobError> {
+    let key =
+        key::artefact(job.run_id().0, job.id().0, job.lease_number().0, name).map_err(JobError::retry)?;
+    let stored = store.put(&key, content.into()).await.map_err(JobError::retry)?;
+    Ok(Artefact {
+        name: name.to_owned(),
+        store_key: stored.key.into(),
+        bytes: i64::try_from(stored.bytes).unwrap_or(i64::MAX),
+        blake3: stored.blake3,
+        media_type: media_type.to_owned(),
+        is_result: false,
+    })
+}
+
+/// Writes an artefact that the user gets.
+///
+/// # Errors
+/// As [`write`].
+pub async fn write_result(
+    store: &Store,
+    job: &JobContext,
+    name: &str,
+    media_type: &str,
+    content: impl Into<Bytes>,
+) -> Result<Artefact, JobError> {
+    Ok(Artefact { is_result: true, ..write(store, job, name, media_type, content).await? })
+}
+
+/// Removes what earlier attempts at the job left. Failing to is no reason to fail the job.
+pub async fn clean_up_earlier_attempts(store: &Store, job: &JobContext) {
+    if job.lease_number().0 <= 1 {
+        return;
+    }
+    match store.remove_earlier_leases(job.run_id().0, job.id().0, job.lease_number().0).await {
+        Ok(0) => {}
+        Ok(removed) => tracing::info!(job.id = job.id().0, removed, "removed what lost attempts left"),
+        Err(error) => tracing::warn!(job.id = job.id().0, %error, "could not remove what lost attempts left"),
+    }
+}
