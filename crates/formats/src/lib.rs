@@ -18,11 +18,17 @@ pub mod bvh;
 mod error;
 mod euler;
 mod frame_rate;
+pub mod motion_csv;
+mod points;
+pub mod points_csv;
 mod read;
 mod text;
+mod time_grid;
+pub mod trc;
 
 pub use bvh::Options as BvhOptions;
 pub use error::{Error, Place};
+pub use points::PointsOptions;
 pub use read::{Read, Warning};
 
 /// Result of the readers.

@@ -145,7 +145,7 @@ fn damage_is_refused_with_its_line() {
         (PLAIN.replace("60 7\n", "60 7 8\n"), "line 33: found 14 values, expected 13"),
         (PLAIN.replace("0.0083333", "0"), "line 32: found \"0\", expected seconds per frame"),
         (PLAIN.replace("MOTION", "ROOT b"), "line 30: found \"ROOT\", expected MOTION"),
-        (PLAIN[..300].to_owned(), "line 14: found the end of the file, expected"),
+        (PLAIN[..300].to_owned(), "line 18: found \"Yrota\", expected a channel"),
     ];
     for (text, expected) in cases {
         assert!(error_of(&text).starts_with(expected), "{} instead of {expected}", error_of(&text));

@@ -180,34 +180,39 @@ fn check_structure(clip: &Clip, first: &Clip) -> Result<()> {
         first: first.name.clone(),
         difference,
     };
-    if !skeleton.same_structure(expected) {
-        return Err(mismatch(structure_difference(skeleton, expected)));
-    }
-    for (a, b) in skeleton.joints().iter().zip(expected.joints()) {
-        if (a.axes.matrix() - b.axes.matrix()).norm() > 1e-3 {
-            return Err(mismatch(format!("the rotation axes of joint {} differ", a.name)));
-        }
-    }
-    Ok(())
+    structure_difference(skeleton, expected).map_or(Ok(()), |difference| Err(mismatch(difference)))
 }
 
-/// Says in words where two skeletons differ.
-pub(crate) fn structure_difference(found: &Skeleton, expected: &Skeleton) -> String {
+impl MotionDatabase {
+    /// Says in words why a pose of `skeleton` would not be a pose of this database; `None` if it would be. Lengths may
+    /// differ, joints, channels and rotation axes may not.
+    pub fn structure_difference(&self, skeleton: &Skeleton) -> Option<String> {
+        structure_difference(skeleton, &self.skeleton)
+    }
+}
+
+fn structure_difference(found: &Skeleton, expected: &Skeleton) -> Option<String> {
     if found.num_joints() != expected.num_joints() {
-        return format!("{} joints instead of {}", found.num_joints(), expected.num_joints());
+        return Some(format!("{} joints instead of {}", found.num_joints(), expected.num_joints()));
     }
     for (a, b) in found.joints().iter().zip(expected.joints()) {
         if a.name != b.name {
-            return format!("joint {} instead of {}", a.name, b.name);
+            return Some(format!("joint {} instead of {}", a.name, b.name));
         }
         if a.parent != b.parent {
-            return format!("joint {} hangs from another joint", a.name);
+            return Some(format!("joint {} hangs from another joint", a.name));
         }
         let channels =
             |j: &model::Joint| j.channels.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
         if channels(a) != channels(b) {
-            return format!("joint {} has channels {} instead of {}", a.name, channels(a), channels(b));
+            return Some(format!("joint {} has channels {} instead of {}", a.name, channels(a), channels(b)));
+        }
+        if a.rotation_order != b.rotation_order {
+            return Some(format!("the rotations of joint {} are multiplied in another order", a.name));
+        }
+        if (a.axes.matrix() - b.axes.matrix()).norm() > 1e-3 {
+            return Some(format!("joint {} has other rotation axes", a.name));
         }
     }
-    "rotations are multiplied in another order".to_owned()
+    None
 }

@@ -1,1 +1,29 @@
-//! Sparse reconstruction: full-body motion from a few control points.
+//! Sparse reconstruction: full-body motion from the trajectories of a few control points (method §2).
+//!
+//! Frame by frame: the K database windows nearest to the last poses and the measured points
+//! ([`motion_db::WindowIndex`]), a regression from window to next pose ([`regression`]), and the most probable pose
+//! between that prediction and the measurement ([`posterior::MapSolver`]).
+//!
+//! - [`Session`]: skeleton, control points and their trajectories at 60 frames a second.
+//! - [`Parameters`]: everything a run can choose, each with a default.
+//! - [`Reconstructor`]: the frame loop over a range of frames, with start and re-entry.
+//! - [`plan_chunks`], [`merge`]: long sessions cut for many workers and put together again.
+
+mod bytes;
+mod chunks;
+mod error;
+mod examples;
+mod parameters;
+mod reconstruct;
+mod session;
+mod tracker;
+
+pub use chunks::{Chunk, Merged, merge, plan_chunks};
+pub use error::Error;
+pub use kinematics::{ControlPoint, control_points};
+pub use parameters::{Covariance, Method, Parameters};
+pub use reconstruct::{FrameQuality, Reconstruction, Reconstructor};
+pub use session::Session;
+
+/// Result of the fallible functions of this crate.
+pub type Result<T> = std::result::Result<T, Error>;

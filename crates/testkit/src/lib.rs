@@ -1,1 +1,3 @@
-//! Throw-away PostgreSQL and synthetic captures for tests.
+//! What tests stand on: a real PostgreSQL, thrown away afterwards.
+
+pub mod postgres;

@@ -1,0 +1,92 @@
+/// Why a session cannot be reconstructed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parameter out of range.
+    #[error("{name} is {found}, expected {expected}")]
+    Parameter {
+        /// name of the parameter
+        name: &'static str,
+        /// value found
+        found: String,
+        /// what would do
+        expected: &'static str,
+    },
+    /// A control point without a trajectory.
+    #[error("control point {name} has no trajectory, expected one of: {found}")]
+    NoTrajectory {
+        /// the point
+        name: String,
+        /// trajectories there are
+        found: String,
+    },
+    /// Too few or too many control points.
+    #[error("found {found} control points, expected 2 to {max}")]
+    PointCount {
+        /// number found
+        found: usize,
+        /// most points
+        max: usize,
+    },
+    /// Not enough was measured to begin with.
+    #[error(
+        "session has {frames} frames with fewer than two measured control points in each, expected a frame with at least two"
+    )]
+    NothingMeasured {
+        /// frames of the session
+        frames: usize,
+    },
+    /// The session's skeleton is not the database's.
+    #[error("session skeleton does not fit the motion database: {difference}")]
+    Skeleton {
+        /// the first difference
+        difference: String,
+    },
+    /// A trial has fewer frames than asked for.
+    #[error("frames {start} to {end} were asked for, session has {frames}")]
+    Range {
+        /// first frame
+        start: usize,
+        /// one past the last frame
+        end: usize,
+        /// frames of the session
+        frames: usize,
+    },
+    /// No pose of the database fits the first frames.
+    #[error("found no start pose at frame {frame}: no database pose has motion before and after it")]
+    NoStart {
+        /// the frame
+        frame: usize,
+    },
+    /// The caller asked to stop.
+    #[error("stopped at frame {frame}")]
+    Stopped {
+        /// frame at which it stopped
+        frame: usize,
+    },
+    /// An artefact that cannot be read.
+    #[error("not a {what}: {found}")]
+    Bytes {
+        /// kind of artefact
+        what: &'static str,
+        /// what was found
+        found: String,
+    },
+    /// Chunks that do not make up the session.
+    #[error("chunks end at frame {found}, expected frame {expected}")]
+    Chunks {
+        /// first frame that is not covered
+        found: usize,
+        /// frame expected
+        expected: usize,
+    },
+    /// The database refuses.
+    #[error(transparent)]
+    Database(#[from] motion_db::Error),
+    /// The skeleton refuses.
+    #[error(transparent)]
+    Kinematics(#[from] kinematics::Error),
+    /// The vocabulary refuses.
+    #[error(transparent)]
+    Model(#[from] model::Error),
+}

@@ -1,0 +1,188 @@
+use posterior::SolverParameters;
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Result};
+
+/// How the next pose is predicted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// weighted ridge regression on the neighbours
+    #[default]
+    LocalRegression,
+    /// successor of the nearest example: the plain baseline
+    Nearest,
+}
+
+impl std::str::FromStr for Method {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        match name {
+            "local-regression" => Ok(Self::LocalRegression),
+            "nearest" => Ok(Self::Nearest),
+            _ => Err(Error::Parameter {
+                name: "method",
+                found: name.to_owned(),
+                expected: "local-regression or nearest",
+            }),
+        }
+    }
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::LocalRegression => "local-regression",
+            Self::Nearest => "nearest",
+        })
+    }
+}
+
+/// Which covariance the prior has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Covariance {
+    /// that of the leave-one-out residuals
+    #[default]
+    Full,
+    /// its diagonal: an independent σ a DOF, as the papers have it
+    Diagonal,
+}
+
+/// Everything that a reconstruction can choose. Missing fields take their defaults; unknown ones are refused.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Parameters {
+    /// how the next pose is predicted
+    pub method: Method,
+    /// window length m, frames at 60 a second (1 to 16)
+    pub window: usize,
+    /// number of neighbours K (2 to 1024)
+    pub neighbours: usize,
+    /// whether control points join the neighbour search and the regression
+    pub control_points_in_query: bool,
+    /// degrees that one centimetre between control points counts for in the search and the regression
+    pub control_weight: f64,
+    /// standard deviation of a control point's coordinate, metres
+    pub control_sigma_m: f64,
+    /// which covariance the prior has
+    pub covariance: Covariance,
+    /// constant part of the ridge, degrees
+    pub ridge_deg: f64,
+    /// part of the ridge that grows with the squared distance of the nearest neighbour
+    pub ridge_distance: f64,
+    /// kernel width h² relative to the neighbours' median squared distance
+    pub bandwidth: f64,
+    /// least standard deviation of a coordinate under the prior, degrees (angles) and centimetres (translations)
+    pub min_sigma_deg: f64,
+    /// most steps of the solver a frame
+    pub max_steps: usize,
+    /// start poses that are tried
+    pub start_candidates: usize,
+    /// frames over which start poses are compared
+    pub start_frames: usize,
+    /// energy per measured coordinate (1 on average if all is well) above which a frame counts as lost
+    pub lost_energy: f64,
+    /// lost frames in a row after which other start poses are tried
+    pub lost_frames: usize,
+    /// frames that one job reconstructs
+    pub chunk_frames: usize,
+    /// frames that a job reconstructs before its own, to forget how it started
+    pub warm_up_frames: usize,
+    /// frames over which neighbouring chunks are blended
+    pub blend_frames: usize,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            method: Method::default(),
+            window: 2,
+            neighbours: 64,
+            control_points_in_query: true,
+            control_weight: 1.0,
+            control_sigma_m: 0.0015,
+            covariance: Covariance::default(),
+            ridge_deg: 3.0,
+            ridge_distance: 1.0,
+            bandwidth: 1.0,
+            min_sigma_deg: 1.0,
+            max_steps: 12,
+            start_candidates: 8,
+            start_frames: 24,
+            lost_energy: 30.0,
+            lost_frames: 5,
+            chunk_frames: 600,
+            warm_up_frames: 120,
+            blend_frames: 30,
+        }
+    }
+}
+
+impl Parameters {
+    /// Checks every value against its range.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] names the first one out of range.
+    pub fn check(&self) -> Result<()> {
+        let count = |name, value: usize, low: usize, high: usize, expected| {
+            if (low..=high).contains(&value) {
+                return Ok(());
+            }
+            Err(Error::Parameter { name, found: value.to_string(), expected })
+        };
+        let number = |name, value: f64, low: f64, high: f64, expected| {
+            if value >= low && value <= high {
+                return Ok(());
+            }
+            Err(Error::Parameter { name, found: value.to_string(), expected })
+        };
+        count("window", self.window, 1, 16, "1 to 16 frames")?;
+        count("neighbours", self.neighbours, 2, 1024, "2 to 1024")?;
+        count("max_steps", self.max_steps, 1, 100, "1 to 100")?;
+        count("start_candidates", self.start_candidates, 1, 64, "1 to 64")?;
+        count("start_frames", self.start_frames, 1, 240, "1 to 240 frames")?;
+        count("lost_frames", self.lost_frames, 1, 10_000, "1 to 10000 frames")?;
+        count("chunk_frames", self.chunk_frames, 60, 100_000, "60 to 100000 frames")?;
+        count("warm_up_frames", self.warm_up_frames, 0, 6_000, "0 to 6000 frames")?;
+        count("blend_frames", self.blend_frames, 0, 60, "0 to 60 frames")?;
+        number("control_weight", self.control_weight, 0.0, 1e3, "0 to 1000 degrees per centimetre")?;
+        number("control_sigma_m", self.control_sigma_m, 1e-5, 1.0, "0.00001 to 1 m")?;
+        number("ridge_deg", self.ridge_deg, 1e-3, 1e3, "0.001 to 1000 degrees")?;
+        number("ridge_distance", self.ridge_distance, 0.0, 1e3, "0 to 1000")?;
+        number("bandwidth", self.bandwidth, 1e-3, 1e3, "0.001 to 1000")?;
+        number("min_sigma_deg", self.min_sigma_deg, 1e-3, 90.0, "0.001 to 90 degrees")?;
+        number("lost_energy", self.lost_energy, 1.0, 1e12, "1 to 1e12")
+    }
+
+    pub(crate) fn regression(&self) -> regression::Parameters {
+        regression::Parameters {
+            ridge: self.ridge_deg * self.ridge_deg,
+            ridge_distance: self.ridge_distance,
+            bandwidth: self.bandwidth,
+            min_sigma: self.min_sigma_deg,
+        }
+    }
+
+    pub(crate) fn solver(&self) -> SolverParameters {
+        SolverParameters { max_steps: self.max_steps, ..SolverParameters::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_in_range() {
+        Parameters::default().check().unwrap();
+    }
+
+    #[test]
+    fn a_parameter_out_of_range_is_named() {
+        let parameters = Parameters { control_sigma_m: f64::NAN, ..Parameters::default() };
+        let message = parameters.check().unwrap_err().to_string();
+        assert_eq!(message, "control_sigma_m is NaN, expected 0.00001 to 1 m");
+    }
+}

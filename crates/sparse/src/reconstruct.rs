@@ -1,0 +1,246 @@
+use std::ops::{ControlFlow, Range};
+
+use kinematics::{Kinematics, PointSet};
+use motion_db::{ControlTable, MotionDatabase, WindowIndex, start_poses};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::bytes::{Reader, Writer};
+use crate::tracker::{Track, Tracker};
+use crate::{Error, Parameters, Result, Session};
+
+const MAGIC: &[u8; 8] = b"MAREYREC";
+/// Numbers a frame's quality is written as.
+const QUALITY_NUMBERS: usize = 5;
+
+/// How well a frame is known.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FrameQuality {
+    /// root mean square distance between the control points and their measured positions, metres
+    pub residual_m: f64,
+    /// mean posterior standard deviation of the joint angles, radians
+    pub sigma_rad: f64,
+    /// energy per measured coordinate: about 1 when measurement and prediction agree
+    pub energy: f64,
+    /// distance of the nearest database window, degrees (root mean square over its numbers)
+    pub neighbour_distance_deg: f64,
+    /// number of measured control points
+    pub measured_points: usize,
+}
+
+/// The poses of a range of frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reconstruction {
+    /// first frame of the session that was reconstructed
+    pub first_frame: usize,
+    /// smooth coordinates (see [`kinematics::Parametrisation::smooth`]), metres and radians, shape `[frames, dofs]`
+    pub coordinates: Vec<f64>,
+    /// shape `[frames]`
+    pub quality: Vec<FrameQuality>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    first_frame: usize,
+    frames: usize,
+    dofs: usize,
+}
+
+impl Reconstruction {
+    /// The reconstruction as an artefact; read by [`Self::from_bytes`].
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let frames = self.quality.len();
+        let dofs = self.coordinates.len().checked_div(frames).unwrap_or(0);
+        let mut writer = Writer::new(MAGIC, &Header { first_frame: self.first_frame, frames, dofs });
+        writer.numbers(&self.coordinates);
+        for q in &self.quality {
+            writer.numbers(&[
+                q.residual_m,
+                q.sigma_rad,
+                q.energy,
+                q.neighbour_distance_deg,
+                q.measured_points as f64,
+            ]);
+        }
+        writer.finish()
+    }
+
+    /// Reads what [`Self::to_bytes`] wrote.
+    ///
+    /// # Errors
+    /// If the bytes are something else, or contradict themselves.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let (header, mut reader): (Header, _) = Reader::new(bytes, MAGIC, "reconstruction artefact")?;
+        let coordinates = reader.numbers(header.frames.checked_mul(header.dofs))?;
+        let numbers = reader.numbers(header.frames.checked_mul(QUALITY_NUMBERS))?;
+        reader.end()?;
+        let quality = numbers.as_chunks::<QUALITY_NUMBERS>().0.iter().map(|n| FrameQuality {
+            residual_m: n[0],
+            sigma_rad: n[1],
+            energy: n[2],
+            neighbour_distance_deg: n[3],
+            measured_points: n[4] as usize,
+        });
+        Ok(Self { first_frame: header.first_frame, coordinates, quality: quality.collect() })
+    }
+}
+
+/// Reconstructs frames of one session with one database.
+pub struct Reconstructor<'a> {
+    database: &'a MotionDatabase,
+    index: &'a WindowIndex,
+    session: &'a Session,
+    parameters: &'a Parameters,
+    kinematics: Kinematics,
+    points: PointSet,
+    table: std::sync::Arc<ControlTable>,
+    /// windows and poses that may not be used, in rising order
+    exclude_rows: Vec<Range<usize>>,
+    exclude_poses: Vec<Range<usize>>,
+}
+
+impl<'a> Reconstructor<'a> {
+    /// Prepares a session: where its control points would be in every pose of the database (about 3 µs a pose).
+    ///
+    /// `index` must have been made from `database` with the parameters' window.
+    ///
+    /// # Errors
+    /// If a parameter is out of range or the session's skeleton has another structure than the database's.
+    pub fn new(
+        database: &'a MotionDatabase,
+        index: &'a WindowIndex,
+        session: &'a Session,
+        parameters: &'a Parameters,
+    ) -> Result<Self> {
+        parameters.check()?;
+        if let Some(difference) = database.structure_difference(&session.skeleton) {
+            return Err(Error::Skeleton { difference });
+        }
+        if index.window() != parameters.window {
+            return Err(Error::Parameter {
+                name: "window",
+                found: format!("{} with an index of windows of {}", parameters.window, index.window()),
+                expected: "the same",
+            });
+        }
+        let kinematics = database.kinematics(&session.skeleton);
+        let points = PointSet::new(&kinematics, session.points.clone());
+        let table = ControlTable::new(database, index, &session.skeleton, &kinematics, &points).into();
+        Ok(Self {
+            database,
+            index,
+            session,
+            parameters,
+            kinematics,
+            points,
+            table,
+            exclude_rows: Vec::new(),
+            exclude_poses: Vec::new(),
+        })
+    }
+
+    /// Leaves clips out of every search: `is_excluded` sees each clip of the database.
+    pub fn exclude(&mut self, is_excluded: impl Fn(&motion_db::ClipInfo) -> bool) {
+        self.exclude_rows.clear();
+        self.exclude_poses.clear();
+        for (i, clip) in self.database.clips().iter().enumerate().filter(|(_, c)| is_excluded(c)) {
+            self.exclude_rows.push(self.index.clip_rows(i));
+            self.exclude_poses.push(clip.first_pose..clip.first_pose + clip.num_poses);
+        }
+    }
+
+    /// Reconstructs `frames` of the session in order. `progress` is called after every frame with the number of frames
+    /// done, and may stop it. The same arguments always give the same bits.
+    ///
+    /// # Errors
+    /// If the range is not in the session, no start pose is found, or `progress` stops it.
+    pub fn reconstruct(
+        &self,
+        frames: Range<usize>,
+        progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Reconstruction> {
+        let total = self.session.num_frames();
+        if frames.start >= frames.end || frames.end > total {
+            return Err(Error::Range { start: frames.start, end: frames.end, frames: total });
+        }
+        let mut tracker = Tracker::new(
+            self.database,
+            self.index,
+            &self.table,
+            self.session,
+            &self.kinematics,
+            &self.points,
+            self.parameters,
+            &self.exclude_rows,
+        );
+        let dofs = self.database.num_dofs();
+        let mut reconstruction = Reconstruction {
+            first_frame: frames.start,
+            coordinates: Vec::with_capacity(frames.len() * dofs),
+            quality: Vec::with_capacity(frames.len()),
+        };
+        let mut sigmas = vec![0.0; dofs];
+        let mut track = self.start(&mut tracker, frames.start, None)?;
+        let mut lost = 0;
+        for frame in frames.clone() {
+            let before = track.clone();
+            let mut step = tracker.step(&mut track, self.session.trajectories.frame(frame));
+            lost = if step.energy() > self.parameters.lost_energy { lost + 1 } else { 0 };
+            if lost >= self.parameters.lost_frames {
+                lost = 0;
+                track = self.start(&mut tracker, frame, Some(before))?;
+                step = tracker.step(&mut track, self.session.trajectories.frame(frame));
+            }
+            reconstruction.coordinates.extend_from_slice(track.newest());
+            reconstruction.quality.push(FrameQuality {
+                residual_m: step.solution.residual_m,
+                sigma_rad: tracker.standard_deviations(&mut sigmas),
+                energy: step.energy(),
+                neighbour_distance_deg: step.neighbour_distance,
+                measured_points: step.measured / 3,
+            });
+            if progress(frame - frames.start + 1).is_break() {
+                return Err(Error::Stopped { frame });
+            }
+        }
+        Ok(reconstruction)
+    }
+
+    /// The best of several beginnings at `frame` (method §2, mend 8): database poses whose control points fit the
+    /// coming frames, each run over these frames, and `current` among them if there is one. The one of least energy
+    /// wins.
+    fn start(&self, tracker: &mut Tracker<'_>, frame: usize, current: Option<Track>) -> Result<Track> {
+        let trajectories = &self.session.trajectories;
+        // Without two measured points there is nothing to fit: look at the first frame that has them.
+        let has_two = |f: &usize| trajectories.frame(*f).iter().filter(|p| p.x.is_finite()).count() >= 2;
+        let first = (frame..trajectories.num_frames()).find(has_two).unwrap_or(frame);
+        let ahead = self.parameters.start_frames.min(trajectories.num_frames() - first);
+        let offsets: Vec<usize> = (0..ahead).step_by(3).collect();
+        let observed: Vec<Option<Vector3<f64>>> = offsets
+            .iter()
+            .flat_map(|o| (0..trajectories.num_points()).map(move |p| trajectories.position(first + o, p)))
+            .collect();
+        let starts = start_poses(
+            self.database,
+            tracker.table,
+            &offsets,
+            &observed,
+            self.parameters.window,
+            &self.exclude_poses,
+            self.parameters.start_candidates,
+        );
+        let mut best: Option<(f64, Track)> = None;
+        let begun: Vec<Track> = starts.iter().map(|s| tracker.track_from(s)).chain(current).collect();
+        for track in begun {
+            let mut probe = track.clone();
+            let mut energy = 0.0;
+            for f in first..first + ahead {
+                energy += tracker.step(&mut probe, trajectories.frame(f)).energy();
+            }
+            if best.as_ref().is_none_or(|(least, _)| energy < *least) {
+                best = Some((energy, track));
+            }
+        }
+        best.map(|(_, track)| track).ok_or(Error::NoStart { frame })
+    }
+}

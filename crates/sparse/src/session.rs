@@ -1,0 +1,150 @@
+use std::sync::Arc;
+
+use kinematics::ControlPoint;
+use model::{PointTrajectories, Skeleton, SkeletonRecord};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::bytes::{Reader, Writer};
+use crate::{Error, Result};
+
+/// Frames per second of a session inside the program.
+const FRAME_RATE: f64 = motion_db::FRAME_RATE;
+/// Most control points of a session.
+const MAX_POINTS: usize = 16;
+const MAGIC: &[u8; 8] = b"MAREYSES";
+
+/// A sparse capture session: the performer's skeleton and what was measured of them, at 60 frames a second.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Session {
+    /// the performer's skeleton
+    pub skeleton: Arc<Skeleton>,
+    /// the control points
+    pub points: Vec<ControlPoint>,
+    /// one trajectory for each of `points`, in their order, 60 frames a second, metres, y up
+    pub trajectories: PointTrajectories,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    skeleton: SkeletonRecord,
+    points: Vec<PointRecord>,
+    frames: usize,
+}
+
+#[derive(Serialize, Deserialize)]
+struct PointRecord {
+    name: String,
+    joint: usize,
+    offset_m: [f64; 3],
+}
+
+impl Session {
+    /// Picks the trajectories of `points` by name and brings them to 60 frames a second: whole ratios take every
+    /// n-th sample, others interpolate linearly between two measured samples.
+    ///
+    /// # Errors
+    /// If a point has no trajectory, there are fewer than 2 or more than 16 points, or no frame has two measured ones.
+    pub fn new(
+        skeleton: Arc<Skeleton>,
+        points: Vec<ControlPoint>,
+        trajectories: &PointTrajectories,
+    ) -> Result<Self> {
+        if !(2..=MAX_POINTS).contains(&points.len()) {
+            return Err(Error::PointCount { found: points.len(), max: MAX_POINTS });
+        }
+        let columns = points.iter().map(|point| {
+            trajectories.point_index(&point.name).ok_or_else(|| Error::NoTrajectory {
+                name: point.name.clone(),
+                found: trajectories.names().join(", "),
+            })
+        });
+        let columns = columns.collect::<Result<Vec<_>>>()?;
+        let positions = resample(trajectories, &columns);
+        let names = points.iter().map(|p| p.name.clone()).collect();
+        let trajectories = PointTrajectories::new(names, FRAME_RATE, positions)?;
+        let has_enough = |frame| trajectories.frame(frame).iter().filter(|p| p.x.is_finite()).count() >= 2;
+        if !(0..trajectories.num_frames()).any(has_enough) {
+            return Err(Error::NothingMeasured { frames: trajectories.num_frames() });
+        }
+        Ok(Self { skeleton, points, trajectories })
+    }
+
+    /// Number of frames at 60 a second.
+    pub fn num_frames(&self) -> usize {
+        self.trajectories.num_frames()
+    }
+
+    /// The session as an artefact; read by [`Self::from_bytes`].
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let header = Header {
+            skeleton: SkeletonRecord::from(self.skeleton.as_ref()),
+            points: self
+                .points
+                .iter()
+                .map(|p| PointRecord { name: p.name.clone(), joint: p.joint, offset_m: p.offset.into() })
+                .collect(),
+            frames: self.num_frames(),
+        };
+        let mut writer = Writer::new(MAGIC, &header);
+        for frame in 0..self.num_frames() {
+            for position in self.trajectories.frame(frame) {
+                writer.numbers(position.as_slice());
+            }
+        }
+        writer.finish()
+    }
+
+    /// Reads what [`Self::to_bytes`] wrote.
+    ///
+    /// # Errors
+    /// If the bytes are something else, or contradict themselves.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let what = "session artefact";
+        let (header, mut reader): (Header, _) = Reader::new(bytes, MAGIC, what)?;
+        let skeleton = Skeleton::try_from(header.skeleton)?;
+        let points: Vec<_> = header
+            .points
+            .into_iter()
+            .map(|p| ControlPoint { name: p.name, joint: p.joint, offset: Vector3::from(p.offset_m) })
+            .collect();
+        if let Some(bad) = points.iter().find(|p| p.joint >= skeleton.num_joints()) {
+            return Err(Error::Bytes { what, found: format!("point {} on joint {}", bad.name, bad.joint) });
+        }
+        let count = header.frames.checked_mul(points.len()).and_then(|n| n.checked_mul(3));
+        let numbers = reader.numbers(count)?;
+        reader.end()?;
+        let positions = numbers.as_chunks::<3>().0.iter().map(|p| Vector3::from(*p)).collect();
+        let names = points.iter().map(|p| p.name.clone()).collect();
+        let trajectories = PointTrajectories::new(names, FRAME_RATE, positions)?;
+        Ok(Self { skeleton: skeleton.into(), points, trajectories })
+    }
+}
+
+fn resample(trajectories: &PointTrajectories, columns: &[usize]) -> Vec<Vector3<f64>> {
+    let ratio = trajectories.frame_rate() / FRAME_RATE;
+    let whole = ratio.round();
+    let frames = trajectories.num_frames();
+    if whole >= 1.0 && (ratio - whole).abs() < 0.01 * whole {
+        let picked = (0..frames).step_by(whole as usize);
+        return picked.flat_map(|f| columns.iter().map(move |&c| trajectories.frame(f)[c])).collect();
+    }
+    if frames == 0 {
+        return Vec::new();
+    }
+    let duration = (frames - 1) as f64 / trajectories.frame_rate();
+    let count = (duration * FRAME_RATE + 1e-9).floor() as usize + 1;
+    let mut out = Vec::with_capacity(count * columns.len());
+    for frame in 0..count {
+        let at = frame as f64 * ratio;
+        let low = (at.floor() as usize).min(frames - 1);
+        let high = (low + 1).min(frames - 1);
+        let share = at - low as f64;
+        for &c in columns {
+            let (a, b) = (trajectories.frame(low)[c], trajectories.frame(high)[c]);
+            // A sample that falls on a measured frame does not need the next one.
+            out.push(if share < 1e-6 { a } else { a + (b - a) * share });
+        }
+    }
+    out
+}

@@ -1,0 +1,261 @@
+use std::ops::Range;
+
+use kinematics::{Kinematics, PointSet};
+use motion_db::{
+    ControlTable, HeadingFrame, MotionDatabase, Neighbour, Query, Scratch, SkeletonSize, StartPose,
+    WindowIndex,
+};
+use nalgebra::Vector3;
+use posterior::{ControlPoints, GaussianPrior, MapSolver, Measurement, Solution};
+use regression::{LocalRegression, NearestExample, Prediction, Predictor};
+
+use crate::examples::ExampleBuffer;
+use crate::{Covariance, Method, Parameters, Session};
+
+/// What is known of the person at a frame: the last m poses, newest first, in world coordinates (metres, radians,
+/// the performer's scale), and the rows that matched last.
+#[derive(Debug, Clone)]
+pub struct Track {
+    history: Vec<Vec<f64>>,
+    matches: Vec<usize>,
+}
+
+impl Track {
+    pub fn newest(&self) -> &[f64] {
+        &self.history[0]
+    }
+}
+
+/// One frame's outcome.
+#[derive(Debug, Clone, Copy)]
+pub struct Step {
+    pub solution: Solution,
+    /// coordinates that were measured, three a point
+    pub measured: usize,
+    /// distance of the nearest window, degrees and centimetres per root of the number of features
+    pub neighbour_distance: f64,
+}
+
+impl Step {
+    /// Energy per measured coordinate: about 1 when measurement and prediction agree within their uncertainties.
+    pub fn energy(&self) -> f64 {
+        if self.measured == 0 {
+            return 0.0;
+        }
+        (self.solution.likelihood_energy + self.solution.prior_energy) / self.measured as f64
+    }
+}
+
+/// The pieces that take a [`Track`] one frame further, with all their memory.
+pub struct Tracker<'a> {
+    database: &'a MotionDatabase,
+    index: &'a WindowIndex,
+    pub table: &'a ControlTable,
+    parameters: &'a Parameters,
+    kinematics: &'a Kinematics,
+    /// database translation per session translation
+    scale: f64,
+    root_offset: Vector3<f64>,
+    exclude: &'a [Range<usize>],
+    predictor: Box<dyn Predictor>,
+    prediction: Prediction,
+    examples: ExampleBuffer,
+    prior: GaussianPrior,
+    min_sigma: Vec<f64>,
+    likelihood: ControlPoints,
+    solver: MapSolver,
+    search: Scratch,
+    neighbours: Vec<Neighbour>,
+    // Query: window features in double and single precision, control points.
+    scaled_history: Vec<Vec<f64>>,
+    features: Vec<f64>,
+    query: Vec<f64>,
+    query_single: Vec<f32>,
+    controls: Vec<f32>,
+    control_weights: Vec<f32>,
+    control_factors: Vec<f64>,
+    measured: Vec<Option<Measurement>>,
+    local: Vec<f64>,
+}
+
+impl<'a> Tracker<'a> {
+    pub fn new(
+        database: &'a MotionDatabase,
+        index: &'a WindowIndex,
+        table: &'a ControlTable,
+        session: &Session,
+        kinematics: &'a Kinematics,
+        points: &PointSet,
+        parameters: &'a Parameters,
+        exclude: &'a [Range<usize>],
+    ) -> Self {
+        let dofs = database.num_dofs();
+        let k = parameters.neighbours;
+        let num_controls = 3 * points.len();
+        let width = index.width() + if parameters.control_points_in_query { num_controls } else { 0 };
+        let predictor: Box<dyn Predictor> = match parameters.method {
+            Method::LocalRegression => Box::new(LocalRegression::new(k, width, dofs)),
+            Method::Nearest => Box::new(NearestExample),
+        };
+        let per_dof = &index.scale().per_dof;
+        Self {
+            scale: database.leg_length() / SkeletonSize::leg_length(&session.skeleton),
+            root_offset: session.skeleton.joints()[0].offset,
+            predictor,
+            prediction: Prediction::new(k, dofs),
+            examples: ExampleBuffer::new(k, width, dofs),
+            prior: GaussianPrior::new(dofs),
+            min_sigma: per_dof.iter().map(|s| parameters.min_sigma_deg / s).collect(),
+            likelihood: ControlPoints::new(kinematics, points.clone()),
+            solver: MapSolver::new(points.len(), dofs),
+            search: Scratch::default(),
+            neighbours: Vec::with_capacity(k),
+            scaled_history: vec![vec![0.0; dofs]; parameters.window],
+            features: vec![0.0; index.width()],
+            query: vec![0.0; width],
+            query_single: vec![0.0; index.width()],
+            controls: vec![0.0; num_controls],
+            control_weights: vec![0.0; num_controls],
+            control_factors: vec![0.0; num_controls],
+            measured: vec![None; points.len()],
+            local: vec![0.0; dofs],
+            database,
+            index,
+            table,
+            parameters,
+            kinematics,
+            exclude,
+        }
+    }
+
+    /// A track that stands where a start pose of the database was put.
+    pub fn track_from(&self, start: &StartPose) -> Track {
+        let placed = |back: usize| {
+            let mut pose = vec![0.0; self.database.num_dofs()];
+            self.database.copy_pose(start.pose - back, &mut pose);
+            pose[..3].iter_mut().for_each(|v| *v /= self.scale);
+            // The shift was found for points, which hang from the root's offset.
+            let turned = HeadingFrame::new(0.0, 0.0, start.turn);
+            let root = Vector3::new(pose[0], 0.0, pose[2]) + self.root_offset;
+            let root = turned.world_from_local(&root) - self.root_offset;
+            pose[0] = root.x + start.shift[0];
+            pose[2] = root.z + start.shift[1];
+            pose[kinematics::HEADING] += start.turn;
+            pose
+        };
+        Track { history: (1..=self.parameters.window).map(placed).collect(), matches: Vec::new() }
+    }
+
+    /// Takes `track` one frame further with the measured positions of that frame (metres, world; NaN where not
+    /// measured).
+    pub fn step(&mut self, track: &mut Track, measured: &[Vector3<f64>]) -> Step {
+        let frame = HeadingFrame::of(track.newest());
+        self.measure(&frame, measured);
+        self.find_neighbours(track);
+        self.predict();
+        let solution = self.solver.solve(
+            self.kinematics,
+            &mut self.likelihood,
+            &self.measured,
+            &self.prior,
+            &self.parameters.solver(),
+        );
+        // The oldest pose makes room for the new one.
+        track.history.rotate_right(1);
+        let newest = &mut track.history[0];
+        newest.copy_from_slice(self.solver.coordinates());
+        frame.absolute(newest);
+        track.matches.clear();
+        track.matches.extend(self.neighbours.iter().map(|n| n.row));
+        let measured = 3 * self.measured.iter().flatten().count();
+        let nearest = self.neighbours.first().map_or(f64::INFINITY, |n| n.distance_squared);
+        Step { solution, measured, neighbour_distance: (nearest / self.query.len() as f64).sqrt() }
+    }
+
+    /// Mean posterior standard deviation over the joint angles of the last step, radians; `all` receives every
+    /// coordinate's, shape `[dofs]`.
+    pub fn standard_deviations(&mut self, all: &mut [f64]) -> f64 {
+        self.solver.standard_deviations(
+            self.kinematics,
+            &mut self.likelihood,
+            &self.measured,
+            &self.prior,
+            all,
+        );
+        let angles = &all[kinematics::ROOT_DOFS..];
+        angles.iter().sum::<f64>() / angles.len().max(1) as f64
+    }
+
+    /// Brings the measurements into the heading frame, for the solver and for the search.
+    fn measure(&mut self, frame: &HeadingFrame, measured: &[Vector3<f64>]) {
+        let floor = Vector3::new(self.root_offset.x, 0.0, self.root_offset.z);
+        let weight = self.parameters.control_weight;
+        for (p, world) in measured.iter().enumerate() {
+            let is_measured = world.x.is_finite();
+            let local = if is_measured { frame.local_from_world(&(world - floor)) } else { Vector3::zeros() };
+            self.measured[p] = is_measured
+                .then(|| Measurement { position: local + floor, sigma: self.parameters.control_sigma_m });
+            let factor = if is_measured { weight } else { 0.0 };
+            for i in 0..3 {
+                self.controls[3 * p + i] = (local[i] * 100.0) as f32;
+                self.control_weights[3 * p + i] = (factor * factor) as f32;
+                self.control_factors[3 * p + i] = factor;
+            }
+        }
+    }
+
+    fn find_neighbours(&mut self, track: &mut Track) {
+        for (scaled, pose) in self.scaled_history.iter_mut().zip(&track.history) {
+            scaled.copy_from_slice(pose);
+            scaled[..3].iter_mut().for_each(|v| *v *= self.scale);
+        }
+        let mut poses: [&[f64]; 16] = [&[]; 16];
+        for (slot, pose) in poses.iter_mut().zip(&self.scaled_history) {
+            *slot = pose;
+        }
+        let (window, controls) = self.query.split_at_mut(self.index.width());
+        self.index.query_features(&poses[..self.parameters.window], &mut self.features, window);
+        for ((out, c), f) in controls.iter_mut().zip(&self.controls).zip(&self.control_factors) {
+            *out = f64::from(*c) * f;
+        }
+        for (single, v) in self.query_single.iter_mut().zip(window) {
+            *single = *v as f32;
+        }
+        // The successors of the last matches are near now.
+        track.matches.iter_mut().for_each(|row| *row += 1);
+        track.matches.sort_unstable();
+        let controls = self.parameters.control_points_in_query.then_some((
+            self.table,
+            &self.controls[..],
+            &self.control_weights[..],
+        ));
+        let query =
+            Query { features: &self.query_single, controls, exclude: self.exclude, hints: &track.matches };
+        self.index.nearest(&query, self.parameters.neighbours, &mut self.search, &mut self.neighbours);
+    }
+
+    fn predict(&mut self) {
+        let controls =
+            self.parameters.control_points_in_query.then_some((self.table, &self.control_factors[..]));
+        let examples = self.examples.gather(self.database, self.index, &self.neighbours, controls);
+        self.predictor.predict(&examples, &self.query, &self.parameters.regression(), &mut self.prediction);
+        // From degrees and centimetres at the database's scale to radians and metres at the performer's.
+        let dofs = self.prior.mean.len();
+        for (d, per_unit) in self.index.scale().per_dof.iter().enumerate() {
+            let factor = if d < 3 { 1.0 / (per_unit * self.scale) } else { 1.0 / per_unit };
+            self.local[d] = factor;
+            self.prior.mean[d] = self.prediction.mean[d] * factor;
+        }
+        let count = self.neighbours.len();
+        let residuals = &mut self.prediction.residuals[..count * dofs];
+        for row in residuals.chunks_exact_mut(dofs) {
+            for (r, factor) in row.iter_mut().zip(&self.local) {
+                *r *= factor;
+            }
+        }
+        match self.parameters.covariance {
+            Covariance::Full => self.prior.set_full(residuals, &self.min_sigma),
+            Covariance::Diagonal => self.prior.set_diagonal(residuals, &self.min_sigma),
+        }
+    }
+}
