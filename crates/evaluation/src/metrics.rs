@@ -1,0 +1,151 @@
+use kinematics::{Kinematics, Parametrisation, nearest_equivalent, rotation_from_angles, unwrap_near};
+use model::{ChannelKind, Joint, Motion, Skeleton};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Errors of a reconstructed motion against the true one.
+///
+/// Joint angles are the file's channels without the root's. Of the Euler triples that stand for the same rotation the
+/// one nearest to the truth is compared, and angles are unwrapped to it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// frames compared
+    pub frames: usize,
+    /// root mean square over frames and joint angles, degrees
+    pub rms_deg: f64,
+    /// mean absolute over frames and joint angles, degrees
+    pub mae_deg: f64,
+    /// mean angle between the true and the found rotation of a joint (root left out), degrees
+    pub geodesic_deg: f64,
+    /// mean distance of the joints and bone ends from their true positions, centimetres
+    pub mpjpe_cm: f64,
+    /// as `mpjpe_cm`, after the roots were brought to the same place, centimetres
+    pub mpjpe_aligned_cm: f64,
+}
+
+/// Compares the frames that both motions have. They must be on the same skeleton and at the same frame rate.
+pub fn compare(truth: &Motion, found: &Motion) -> Errors {
+    let skeleton = truth.skeleton();
+    let frames = truth.num_frames().min(found.num_frames());
+    let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
+    let (mut true_state, mut found_state) = (kinematics.state(), kinematics.state());
+    let mut sums = Sums::default();
+    for frame in 0..frames {
+        let (t, f) = (truth.pose(frame), found.pose(frame));
+        for (j, joint) in skeleton.joints().iter().enumerate().skip(1) {
+            sums.add_joint(joint, &t[skeleton.dofs(j)], &f[skeleton.dofs(j)]);
+        }
+        kinematics.update(t, &mut true_state);
+        kinematics.update(f, &mut found_state);
+        let shift = true_state.positions[0] - found_state.positions[0];
+        for (joint, point) in landmarks(skeleton) {
+            let d = found_state.point(joint, &point) - true_state.point(joint, &point);
+            sums.position += d.norm();
+            sums.aligned_position += (d + shift).norm();
+            sums.positions += 1.0;
+        }
+    }
+    let degrees = 180.0 / std::f64::consts::PI;
+    let mean = |sum: f64, count: f64| if count > 0.0 { sum / count } else { 0.0 };
+    Errors {
+        frames,
+        rms_deg: mean(sums.squares, sums.angles).sqrt() * degrees,
+        mae_deg: mean(sums.absolute, sums.angles) * degrees,
+        geodesic_deg: mean(sums.geodesic, sums.rotations) * degrees,
+        mpjpe_cm: mean(sums.position, sums.positions) * 100.0,
+        mpjpe_aligned_cm: mean(sums.aligned_position, sums.positions) * 100.0,
+    }
+}
+
+#[derive(Default)]
+struct Sums {
+    squares: f64,
+    absolute: f64,
+    angles: f64,
+    geodesic: f64,
+    rotations: f64,
+    position: f64,
+    aligned_position: f64,
+    positions: f64,
+}
+
+impl Sums {
+    fn add_joint(&mut self, joint: &Joint, truth: &[f64], found: &[f64]) {
+        let slot = |axis| {
+            joint.channels.iter().position(|c| c.kind == ChannelKind::Rotation && c.axis == axis).unwrap_or(0)
+        };
+        let slots: Vec<usize> = joint.rotation_order.iter().map(|&axis| slot(axis)).collect();
+        if slots.is_empty() {
+            return;
+        }
+        let t: Vec<f64> = slots.iter().map(|&s| truth[s]).collect();
+        let f: Vec<f64> = slots.iter().map(|&s| found[s]).collect();
+        let nearest: Vec<f64> = match (&t[..], &f[..]) {
+            (&[t0, t1, t2], &[f0, f1, f2]) => nearest_equivalent([f0, f1, f2], [t0, t1, t2]).to_vec(),
+            _ => f.iter().zip(&t).map(|(f, t)| unwrap_near(*f, *t)).collect(),
+        };
+        for (n, t) in nearest.iter().zip(&t) {
+            self.squares += (n - t).powi(2);
+            self.absolute += (n - t).abs();
+            self.angles += 1.0;
+        }
+        let order = &joint.rotation_order;
+        self.geodesic += angle_between(&rotation_from_angles(order, &t), &rotation_from_angles(order, &f));
+        self.rotations += 1.0;
+    }
+}
+
+/// Angle of the rotation from one matrix to the other, radians.
+fn angle_between(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
+    kinematics::rotation_log(&(a.transpose() * b)).norm()
+}
+
+/// Every joint, and the ends of the bones that nothing hangs from.
+fn landmarks(skeleton: &Skeleton) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
+    let has_child = |j: usize| skeleton.joints().iter().any(|joint| joint.parent == Some(j));
+    let joints = (0..skeleton.num_joints()).map(|j| (j, Vector3::zeros()));
+    let ends = skeleton.joints().iter().enumerate();
+    let ends = ends
+        .filter(move |(j, joint)| joint.tip.norm() > 0.0 && !has_child(*j))
+        .map(|(j, joint)| (j, joint.tip));
+    joints.chain(ends)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model::{Axis, Channel};
+
+    fn arm(values: Vec<f64>) -> Motion {
+        let root = Joint::root("root", vec![Channel::translation(Axis::X)]);
+        let rotations = [Axis::Z, Axis::Y, Axis::X].map(Channel::rotation).to_vec();
+        let mut upper = Joint::child("upper", 0, Vector3::zeros(), rotations);
+        upper.tip = Vector3::x();
+        let skeleton = Skeleton::new("arm", vec![root, upper]).unwrap();
+        Motion::new(skeleton.into(), 60.0, values).unwrap()
+    }
+
+    #[test]
+    fn the_other_euler_triple_of_the_same_rotation_is_no_error() {
+        let pi = std::f64::consts::PI;
+        let truth = arm(vec![0.0, 0.1, 0.2, 0.3]);
+        let found = arm(vec![0.0, 0.1 - pi, pi - 0.2, 0.3 + pi]);
+        let errors = compare(&truth, &found);
+        assert!(errors.rms_deg < 1e-9 && errors.geodesic_deg < 1e-5 && errors.mpjpe_cm < 1e-9);
+    }
+
+    #[test]
+    fn a_shifted_root_counts_only_where_roots_are_not_aligned() {
+        let errors = compare(&arm(vec![0.0; 4]), &arm(vec![0.02, 0.0, 0.0, 0.0]));
+        assert!((errors.mpjpe_cm - 2.0).abs() < 1e-9);
+        assert!(errors.mpjpe_aligned_cm < 1e-9);
+    }
+
+    #[test]
+    fn ten_degrees_in_one_of_three_angles_are_known_in_every_metric() {
+        let errors = compare(&arm(vec![0.0; 4]), &arm(vec![0.0, 10f64.to_radians(), 0.0, 0.0]));
+        assert!((errors.mae_deg - 10.0 / 3.0).abs() < 1e-9);
+        assert!((errors.rms_deg - 10.0 / 3f64.sqrt()).abs() < 1e-9);
+        assert!((errors.geodesic_deg - 10.0).abs() < 1e-9);
+    }
+}
