@@ -132,10 +132,9 @@ impl FromRequestParts<App> for Caller {
     type Rejection = Error;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Error> {
-        let header = parts
-            .headers
-            .get(header::AUTHORIZATION)
-            .ok_or(Error::Unauthorized("there is no Authorization header, expected \"Authorization: Bearer mk_…\""))?;
+        let header = parts.headers.get(header::AUTHORIZATION).ok_or(Error::Unauthorized(
+            "there is no Authorization header, expected \"Authorization: Bearer mk_…\"",
+        ))?;
         let key = header
             .to_str()
             .ok()

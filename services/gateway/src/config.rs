@@ -57,14 +57,14 @@ impl Config {
             store.parse().map_err(|e| anyhow::anyhow!("MAREY_STORE: {e}"))?,
         );
         if let Some(listen) = variable("MAREY_LISTEN") {
-            config.listen = listen
-                .parse()
-                .map_err(|_| anyhow::anyhow!("MAREY_LISTEN is {listen:?}, expected an address like 0.0.0.0:8080"))?;
+            config.listen = listen.parse().map_err(|_| {
+                anyhow::anyhow!("MAREY_LISTEN is {listen:?}, expected an address like 0.0.0.0:8080")
+            })?;
         }
         if let Some(bytes) = variable("MAREY_MAX_UPLOAD_BYTES") {
-            config.max_upload_bytes = bytes
-                .parse()
-                .map_err(|_| anyhow::anyhow!("MAREY_MAX_UPLOAD_BYTES is {bytes:?}, expected a number of bytes"))?;
+            config.max_upload_bytes = bytes.parse().map_err(|_| {
+                anyhow::anyhow!("MAREY_MAX_UPLOAD_BYTES is {bytes:?}, expected a number of bytes")
+            })?;
         }
         config.bootstrap_key = variable("MAREY_BOOTSTRAP_KEY").filter(|key| !key.is_empty());
         Ok(config)

@@ -70,7 +70,9 @@ impl From<PathRejection> for Error {
     fn from(rejection: PathRejection) -> Self {
         match rejection {
             // an id that can't be one names nothing
-            PathRejection::FailedToDeserializePathParams(failed) if failed.status() == StatusCode::BAD_REQUEST => {
+            PathRejection::FailedToDeserializePathParams(failed)
+                if failed.status() == StatusCode::BAD_REQUEST =>
+            {
                 Self::NotFound { what: "thing at", which: failed.body_text() }
             }
             other => Self::Internal(format!("path: {}", other.body_text())),

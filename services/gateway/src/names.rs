@@ -19,8 +19,7 @@ pub(crate) fn check_session_name(name: &str) -> Result<()> {
 /// Checks the name of a file: one path component, nothing hidden.
 pub(crate) fn check_file_name(name: &str) -> Result<()> {
     let length = name.chars().count();
-    let plain = !name.starts_with('.')
-        && !name.chars().any(|c| c.is_control() || matches!(c, '/' | '\\'));
+    let plain = !name.starts_with('.') && !name.chars().any(|c| c.is_control() || matches!(c, '/' | '\\'));
     if length == 0 || length > MAX_NAME_CHARS || !plain {
         return Err(Error::Unprocessable(format!(
             "file name {:?} is not one: expected 1 to {MAX_NAME_CHARS} characters without slashes that do not start \
@@ -94,20 +93,18 @@ impl FileRole {
 
     /// Whether motion databases are built from files of that name.
     pub fn is_motion_file(name: &str) -> bool {
-        kind(name).is_some()
-            && !matches!(kind(name), Some("csv" | "trc" | "c3d"))
+        kind(name).is_some() && !matches!(kind(name), Some("csv" | "trc" | "c3d"))
     }
 }
 
 /// The kind of file that a name stands for: its extension in lower case, without `.zst` or `.gz` behind it.
 fn kind(name: &str) -> Option<&'static str> {
-    const KINDS: [&str; 10] =
-        ["asf", "amc", "bvh", "csv", "trc", "c3d", "zip", "tar", "tgz", "tzst"];
+    const KINDS: [&str; 10] = ["asf", "amc", "bvh", "csv", "trc", "c3d", "zip", "tar", "tgz", "tzst"];
     let lower = name.to_ascii_lowercase();
     let inner = lower.strip_suffix(".zst").or(lower.strip_suffix(".gz")).unwrap_or(&lower);
-    KINDS.into_iter().find(|kind| {
-        inner.strip_suffix(kind).is_some_and(|stem| stem.len() > 1 && stem.ends_with('.'))
-    })
+    KINDS
+        .into_iter()
+        .find(|kind| inner.strip_suffix(kind).is_some_and(|stem| stem.len() > 1 && stem.ends_with('.')))
 }
 
 /// The media type by which a file is given back.

@@ -50,7 +50,7 @@ pub(crate) async fn render(app: &App) -> Result<String> {
     .fetch_all(&app.db)
     .await?;
     let mut text = String::new();
-    let mut line = |text: std::fmt::Arguments<'_>, out: &mut String| {
+    let line = |text: std::fmt::Arguments<'_>, out: &mut String| {
         // writing to a String can't fail
         let _ = out.write_fmt(text);
         out.push('\n');
@@ -60,11 +60,16 @@ pub(crate) async fn render(app: &App) -> Result<String> {
     for Count { kind, state, count, .. } in &jobs {
         line(format_args!("marey_jobs{{kind=\"{kind}\",state=\"{state}\"}} {count}"), &mut text);
     }
-    line(format_args!("# HELP marey_oldest_job_age_seconds Age of the oldest job that has not ended."), &mut text);
+    line(
+        format_args!("# HELP marey_oldest_job_age_seconds Age of the oldest job that has not ended."),
+        &mut text,
+    );
     line(format_args!("# TYPE marey_oldest_job_age_seconds gauge"), &mut text);
     for Count { kind, state, oldest_secs, .. } in &jobs {
         line(
-            format_args!("marey_oldest_job_age_seconds{{kind=\"{kind}\",state=\"{state}\"}} {oldest_secs:.3}"),
+            format_args!(
+                "marey_oldest_job_age_seconds{{kind=\"{kind}\",state=\"{state}\"}} {oldest_secs:.3}"
+            ),
             &mut text,
         );
     }

@@ -55,7 +55,12 @@ pub(crate) struct Page<T> {
 
 impl<T> Page<T> {
     /// `rows`: what [`PageQuery::fetch`] asked for, in order.
-    pub fn of<R>(query: &PageQuery, mut rows: Vec<R>, id: impl Fn(&R) -> Uuid, view: impl Fn(R) -> T) -> Result<Self> {
+    pub fn of<R>(
+        query: &PageQuery,
+        mut rows: Vec<R>,
+        id: impl Fn(&R) -> Uuid,
+        view: impl Fn(R) -> T,
+    ) -> Result<Self> {
         let limit = query.limit()? as usize;
         let more = rows.len() > limit;
         rows.truncate(limit);

@@ -34,7 +34,9 @@ impl Announced {
         let sha256 = match headers.get("content-digest") {
             None => None,
             Some(value) => Some(value.to_str().ok().and_then(sha256_of_digest).ok_or_else(|| {
-                Error::BadRequest("Content-Digest has no readable sha-256, expected sha-256=:<base64>:".into())
+                Error::BadRequest(
+                    "Content-Digest has no readable sha-256, expected sha-256=:<base64>:".into(),
+                )
             })?),
         };
         Ok(Self { sha256, content_length })

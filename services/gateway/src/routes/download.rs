@@ -88,7 +88,12 @@ fn wanted_range(headers: &HeaderMap, etag: &str, bytes: u64) -> Result<Option<(u
     if range.0 >= bytes { Err(refuse()) } else { Ok(Some(range)) }
 }
 
-fn pieces(app: App, key: Key, start: u64, end: u64) -> impl Stream<Item = Result<Bytes, store::Error>> + Send {
+fn pieces(
+    app: App,
+    key: Key,
+    start: u64,
+    end: u64,
+) -> impl Stream<Item = Result<Bytes, store::Error>> + Send {
     futures::stream::unfold(start, move |at| {
         let (app, key) = (app.clone(), key.clone());
         async move {
@@ -102,14 +107,22 @@ fn pieces(app: App, key: Key, start: u64, end: u64) -> impl Stream<Item = Result
 
 /// `attachment`, with the name in ASCII for all and in UTF-8 (RFC 6266) for most.
 fn disposition(name: &str) -> String {
-    let ascii: String =
-        name.chars().map(|c| if c.is_ascii_graphic() && c != '"' && c != '\\' || c == ' ' { c } else { '_' }).collect();
+    let ascii: String = name
+        .chars()
+        .map(|c| if c.is_ascii_graphic() && c != '"' && c != '\\' || c == ' ' { c } else { '_' })
+        .collect();
     if ascii == name {
         return format!("attachment; filename=\"{ascii}\"");
     }
     let encoded: String = name
         .bytes()
-        .map(|b| if b.is_ascii_alphanumeric() || b"-._~".contains(&b) { char::from(b).to_string() } else { format!("%{b:02X}") })
+        .map(|b| {
+            if b.is_ascii_alphanumeric() || b"-._~".contains(&b) {
+                char::from(b).to_string()
+            } else {
+                format!("%{b:02X}")
+            }
+        })
         .collect();
     format!("attachment; filename=\"{ascii}\"; filename*=UTF-8''{encoded}")
 }
@@ -119,7 +132,11 @@ mod tests {
     use super::*;
 
     fn range(value: &'static str, bytes: u64) -> Result<Option<(u64, u64)>> {
-        wanted_range(&HeaderMap::from_iter([(header::RANGE, HeaderValue::from_static(value))]), "\"e\"", bytes)
+        wanted_range(
+            &HeaderMap::from_iter([(header::RANGE, HeaderValue::from_static(value))]),
+            "\"e\"",
+            bytes,
+        )
     }
 
     #[test]

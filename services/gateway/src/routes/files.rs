@@ -123,7 +123,8 @@ pub(super) async fn put_in_session(
     let key = store::key::file(caller.project_id, session_id, file_id);
     uninterrupted(async move {
         let stored = upload::receive(&app, &key, &announced, body).await?;
-        let new = NewFile { id: file_id, owner: Owner::Session(session_id), name: &name, role, stored: &stored };
+        let new =
+            NewFile { id: file_id, owner: Owner::Session(session_id), name: &name, role, stored: &stored };
         let kept = keep(&app, caller.project_id, &new).await;
         settle(&app, &key, kept).await
     })
@@ -171,7 +172,8 @@ pub(super) async fn delete_of_session(
     Writer(caller): Writer,
     Path((session_id, name)): Path<(Uuid, String)>,
 ) -> Result<StatusCode> {
-    uninterrupted(async move { remove(&app, caller.project_id, &Owner::Session(session_id), &name).await }).await
+    uninterrupted(async move { remove(&app, caller.project_id, &Owner::Session(session_id), &name).await })
+        .await
 }
 
 /// List the files of a motion database
@@ -186,7 +188,8 @@ pub(super) async fn list_of_database(
     Path(which): Path<String>,
 ) -> Result<Json<Vec<File>>> {
     let mut db = app.db.acquire().await?;
-    let database = lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
+    let database =
+        lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
     Ok(Json(of_owner(&mut db, database.id).await?))
 }
 
@@ -219,7 +222,8 @@ pub(super) async fn put_in_database(
     }
     let announced = Announced::read(&headers)?;
     let mut db = app.db.acquire().await?;
-    let database = lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
+    let database =
+        lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
     drop(db);
     check_collects(&database)?;
     let file_id = Uuid::now_v7();
@@ -248,7 +252,8 @@ pub(super) async fn delete_of_database(
     Path((which, name)): Path<(String, String)>,
 ) -> Result<StatusCode> {
     let mut db = app.db.acquire().await?;
-    let database = lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
+    let database =
+        lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
     drop(db);
     let owner = Owner::MotionDatabase(database.id);
     uninterrupted(async move { remove(&app, caller.project_id, &owner, &name).await }).await
@@ -327,7 +332,12 @@ async fn remove(app: &App, project_id: Uuid, owner: &Owner, name: &str) -> Resul
 }
 
 /// Locks the owner and takes the file's row out, if its owner's state allows; gives the key of its object.
-async fn take_out(db: &mut PgConnection, project_id: Uuid, owner: &Owner, name: &str) -> Result<Option<String>> {
+async fn take_out(
+    db: &mut PgConnection,
+    project_id: Uuid,
+    owner: &Owner,
+    name: &str,
+) -> Result<Option<String>> {
     let id = match owner {
         Owner::Session(id) => {
             lookup::session(db, project_id, *id, Lock::Update).await?;
@@ -350,7 +360,9 @@ async fn take_out(db: &mut PgConnection, project_id: Uuid, owner: &Owner, name: 
     if let (Owner::Session(id), Some(_)) = (owner, &removed)
         && lookup::active_runs_of_session(db, *id).await? > 0
     {
-        return Err(Error::Conflict(format!("a run of this session goes on and reads {name:?}; cancel it first")));
+        return Err(Error::Conflict(format!(
+            "a run of this session goes on and reads {name:?}; cancel it first"
+        )));
     }
     Ok(removed)
 }

@@ -34,7 +34,12 @@ pub(crate) struct Session {
 }
 
 /// The session of that id in the project.
-pub(super) async fn session(db: &mut PgConnection, project_id: Uuid, id: Uuid, lock: Lock) -> Result<Session> {
+pub(super) async fn session(
+    db: &mut PgConnection,
+    project_id: Uuid,
+    id: Uuid,
+    lock: Lock,
+) -> Result<Session> {
     sqlx::query_as(match lock {
         Lock::None => "SELECT id, name, tags, created_at FROM sessions WHERE id = $1 AND project_id = $2",
         Lock::Share => {

@@ -77,8 +77,7 @@ pub(super) async fn get(
     headers: HeaderMap,
 ) -> Result<Response> {
     let results = of_run(&app, caller.project_id, run_id).await?;
-    let result =
-        results.iter().find(|r| r.name == name).ok_or_else(|| Error::not_found("result", &name))?;
+    let result = results.iter().find(|r| r.name == name).ok_or_else(|| Error::not_found("result", &name))?;
     let object = Object {
         name: &result.name,
         store_key: &result.store_key,

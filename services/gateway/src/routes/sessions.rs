@@ -44,7 +44,10 @@ pub(super) async fn create(
 ) -> Result<Answer> {
     names::check_session_name(&body.name)?;
     if body.tags.len() > MAX_TAGS {
-        return Err(Error::Unprocessable(format!("there are {} tags, expected at most {MAX_TAGS}", body.tags.len())));
+        return Err(Error::Unprocessable(format!(
+            "there are {} tags, expected at most {MAX_TAGS}",
+            body.tags.len()
+        )));
     }
     body.tags.iter().try_for_each(|tag| names::check_session_name(tag))?;
     let mut tx = app.db.begin().await?;
@@ -122,8 +125,10 @@ pub(super) async fn delete(
         if active > 0 {
             return Err(Error::Conflict(format!("{active} runs of this session go on; cancel them first")));
         }
-        let runs: Vec<RunId> =
-            sqlx::query_scalar("SELECT id FROM runs WHERE session_id = $1").bind(id).fetch_all(&mut *tx).await?;
+        let runs: Vec<RunId> = sqlx::query_scalar("SELECT id FROM runs WHERE session_id = $1")
+            .bind(id)
+            .fetch_all(&mut *tx)
+            .await?;
         sqlx::query("DELETE FROM sessions WHERE id = $1").bind(id).execute(&mut *tx).await?;
         tx.commit().await?;
         // nothing names these objects any more

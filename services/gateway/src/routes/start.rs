@@ -22,8 +22,8 @@ use crate::{
     error::{Error, Result},
     extract::{Path, Posted},
     jobs::{
-        BUILD_MOTION_DATABASE, BuildMotionDatabase, InputFile, MotionDatabaseFile, MotionDatabaseName, PLAN_SPARSE,
-        PlanSparse,
+        BUILD_MOTION_DATABASE, BuildMotionDatabase, InputFile, MotionDatabaseFile, MotionDatabaseName,
+        PLAN_SPARSE, PlanSparse,
     },
 };
 
@@ -62,18 +62,11 @@ pub(crate) struct NewReconstruction {
 impl NewReconstruction {
     /// All parameters of the method, those left out with their defaults.
     fn resolve(&self) -> Result<Value> {
-        let given = self.given()?;
         let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
         let parameters: sparse::Parameters =
-            serde_json::from_value(Value::Object(given.clone())).map_err(|error| refuse(&error))?;
+            serde_json::from_value(Value::Object(self.given()?)).map_err(|error| refuse(&error))?;
         parameters.check().map_err(|error| refuse(&error))?;
-        let resolved = serde_json::to_value(&parameters)?;
-        if let Some(unknown) = given.keys().find(|key| resolved.get(key.as_str()).is_none()) {
-            let known: Vec<&str> =
-                resolved.as_object().into_iter().flat_map(Map::keys).map(String::as_str).collect();
-            return Err(refuse(&format_args!("{unknown:?} is not one of {}", known.join(", "))));
-        }
-        Ok(resolved)
+        Ok(serde_json::to_value(&parameters)?)
     }
 
     fn given(&self) -> Result<Map<String, Value>> {
@@ -123,7 +116,8 @@ pub(super) async fn reconstruction(
     }
     let session = lookup::session(&mut tx, project_id, session_id, Lock::Share).await?;
     let database =
-        lookup::motion_database(&mut tx, project_id, &body.motion_database, Latest::Ready, Lock::Share).await?;
+        lookup::motion_database(&mut tx, project_id, &body.motion_database, Latest::Ready, Lock::Share)
+            .await?;
     let plan = PlanSparse {
         session_id,
         session_name: session.name,
