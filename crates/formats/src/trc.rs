@@ -1,0 +1,178 @@
+//! TRC: marker trajectories in tab-separated text.
+
+use std::collections::HashMap;
+
+use model::{Axis, PointTrajectories};
+use nalgebra::Vector3;
+
+use crate::{
+    Error, Place, PointsOptions, Read, Result,
+    points::{self, PointNames},
+    read::Warnings,
+    text::{Line, Lines, finite, number, quote},
+    time_grid::Times,
+};
+
+/// Reads marker trajectories; y is up unless the options say otherwise.
+///
+/// Empty cells, `NaN`, cells that a row leaves out at its end, and markers at exactly 0 0 0 are missing. The number
+/// of frames is that of the rows, the frame rate that of the header where the times agree with it; frames without
+/// a row are missing.
+///
+/// # Errors
+/// If the header or a row is not as the format wants it.
+pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajectories>> {
+    let up = options.up.unwrap_or(Axis::Y);
+    let mut warnings = Warnings::default();
+    let mut lines = Lines::new(bytes);
+    let header = Header::read(&mut lines, &mut warnings)?;
+    let points = header.names.len();
+    let max_frames = points::max_frames(bytes.len(), points);
+    let mut times = Times::default();
+    let mut positions = Vec::new();
+    let mut at_origin = 0;
+    while let Some(line) = lines.next_untrimmed() {
+        let mut cells = cells(line.text);
+        let frame = cells.next().unwrap_or_default();
+        let Some(time) = cells.next() else {
+            if frame.is_empty() {
+                continue;
+            }
+            return Err(Error::at_line(line.number, quote(line.text), "a frame number and a time"));
+        };
+        if frame.is_empty() && time.is_empty() && cells.clone().all(<[u8]>::is_empty) {
+            continue;
+        }
+        times.push(line.number, time)?;
+        if positions.len() / points >= max_frames {
+            let found = format!("row {} of {points} markers", positions.len() / points + 1);
+            return Err(Error::at_line(line.number, found, "rows with a cell for each coordinate"));
+        }
+        let start = positions.len();
+        positions.resize(start + points, Vector3::repeat(f64::NAN));
+        for (index, cell) in cells.enumerate() {
+            let value = coordinate(line.number, cell)?;
+            match positions.get_mut(start + index / 3) {
+                Some(position) => position[index % 3] = value * header.metres,
+                None if value.is_nan() => {}
+                None => {
+                    let found = format!("more than {} coordinates", 3 * points);
+                    return Err(Error::at_line(
+                        line.number,
+                        found,
+                        format!("three for each of {points} markers"),
+                    ));
+                }
+            }
+        }
+        for position in &mut positions[start..] {
+            if *position == Vector3::zeros() {
+                at_origin += 1;
+                *position = Vector3::repeat(f64::NAN);
+            }
+            *position = points::y_up(up, *position);
+        }
+    }
+    if positions.is_empty() {
+        return Err(Error::at_line(lines.number(), "the end of the file", "a row of a frame"));
+    }
+    if at_origin > 0 {
+        warnings.add(Place::File, format!("{at_origin} samples at exactly 0 0 0 count as missing"));
+    }
+    let rows = positions.len() / points;
+    header.check_rows(rows, &mut warnings);
+    let grid = times.grid(header.rate, max_frames, &mut warnings)?;
+    let trajectories = points::place(header.names, &positions, &grid)?;
+    Ok(warnings.beside(trajectories))
+}
+
+/// The cells of a line, without blanks around them.
+fn cells(text: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
+    text.split(|b| *b == b'\t').map(<[u8]>::trim_ascii)
+}
+
+fn coordinate(line: usize, cell: &[u8]) -> Result<f64> {
+    if cell.is_empty() {
+        return Ok(f64::NAN);
+    }
+    let value = number(cell).filter(|v| !v.is_infinite());
+    value.ok_or_else(|| Error::at_line(line, quote(cell), "a number, NaN or an empty cell"))
+}
+
+/// The five lines before the rows.
+struct Header {
+    line: usize,
+    rate: Option<f64>,
+    metres: f64,
+    frames: Option<u64>,
+    names: Vec<String>,
+}
+
+impl Header {
+    fn read(lines: &mut Lines<'_>, warnings: &mut Warnings) -> Result<Self> {
+        let first = next_line(lines, "PathFileType")?;
+        if !first.text.starts_with(b"PathFileType") {
+            return Err(Error::at_line(first.number, quote(first.text), "PathFileType"));
+        }
+        let keys = next_line(lines, "DataRate and other keys")?;
+        let line = next_line(lines, "the values of the keys")?;
+        let values: HashMap<_, _> =
+            cells(keys.text).map(<[u8]>::to_ascii_lowercase).zip(cells(line.text)).collect();
+        let get = |key: &[u8]| values.get(key).copied().unwrap_or_default();
+        let rate =
+            match get(b"datarate") {
+                b"" => None,
+                cell => Some(finite(cell).filter(|r| (1e-6..=1e6).contains(r)).ok_or_else(|| {
+                    Error::at_line(line.number, quote(cell), "DataRate: frames per second")
+                })?),
+            };
+        let metres = points::metres_or_mm(get(b"units"), Place::Line(line.number), warnings)?;
+        let count = |cell: &[u8]| std::str::from_utf8(cell).ok().and_then(|text| text.parse::<u64>().ok());
+        let frames = count(get(b"numframes"));
+        let markers = count(get(b"nummarkers"));
+
+        let names_line = next_line(lines, "Frame#, Time and the names of the markers")?;
+        let is_frame =
+            cells(names_line.text).next().is_some_and(|c| c.to_ascii_lowercase().starts_with(b"frame"));
+        if !is_frame {
+            return Err(Error::at_line(names_line.number, quote(names_line.text), "Frame#"));
+        }
+        let mut names = PointNames::default();
+        for cell in cells(names_line.text).skip(2).filter(|c| !c.is_empty()) {
+            names.push(&String::from_utf8_lossy(cell), Place::Line(names_line.number), warnings);
+        }
+        let names = names.list;
+        if names.is_empty() {
+            return Err(Error::at_line(names_line.number, "no names of markers", "at least one"));
+        }
+        if markers != Some(names.len() as u64) {
+            let declared = markers.map_or("an unknown number of".into(), |m| m.to_string());
+            let message = format!("the file declares {declared} markers and names {}", names.len());
+            warnings.line(line.number, message);
+        }
+        let axes = next_line(lines, "X1, Y1, Z1 and so on")?;
+        if !cells(axes.text).any(|c| c.eq_ignore_ascii_case(b"x1")) {
+            return Err(Error::at_line(axes.number, quote(axes.text), "X1, Y1, Z1 and so on"));
+        }
+        Ok(Self { line: line.number, rate, metres, frames, names })
+    }
+
+    fn check_rows(&self, found: usize, warnings: &mut Warnings) {
+        if self.frames != Some(found as u64) {
+            let declared = self.frames.map_or("an unknown number of".into(), |n| n.to_string());
+            let message =
+                format!("the file declares {declared} frames and has {found}; all {found} are read");
+            warnings.line(self.line, message);
+        }
+    }
+}
+
+/// The next line that is not empty.
+fn next_line<'a>(lines: &mut Lines<'a>, expected: &str) -> Result<Line<'a>> {
+    while let Some(line) = lines.next_untrimmed() {
+        if !line.text.trim_ascii().is_empty() {
+            return Ok(line);
+        }
+    }
+    Err(Error::at_line(lines.number(), "the end of the file", expected))
+}
