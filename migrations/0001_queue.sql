@@ -118,7 +118,7 @@ BEGIN
             USING ERRCODE = 'check_violation', CONSTRAINT = 'jobs_legal_steps';
     END IF;
     IF NEW.lease_number <> OLD.lease_number
-        + CASE WHEN OLD.state = 'available' AND NEW.state = 'running' THEN 1 ELSE 0 END THEN
+        + (OLD.state = 'available' AND NEW.state = 'running')::integer THEN
         RAISE EXCEPTION 'job %: a claim, and nothing else, raises the lease number by one (found % after %)',
             OLD.id, NEW.lease_number, OLD.lease_number
             USING ERRCODE = 'check_violation', CONSTRAINT = 'jobs_lease_is_monotonic';

@@ -1,0 +1,73 @@
+//! Stopping a worker.
+
+use std::time::Duration;
+
+use queue::{JobError, Outcome, RunState};
+use tokio_util::sync::CancellationToken;
+
+use crate::support::{Queue, does, jobs, succeeds};
+
+#[tokio::test]
+async fn a_shutdown_lets_jobs_end_within_the_grace_and_claims_no_more() {
+    let queue = Queue::new().await;
+    let shutdown = CancellationToken::new();
+    let seen = shutdown.clone();
+    let handler = does("chunk", move |job| {
+        let seen = seen.clone();
+        async move {
+            seen.cancelled().await;
+            assert!(!job.is_cancelled(), "a shutdown is not a cancel");
+            Ok(Outcome::default())
+        }
+    });
+    let (_, ids) = queue.run(&jobs("chunk", 3)).await;
+    let worker = queue.worker().handler(handler).concurrency(2).start(shutdown.clone());
+    queue.wait_for_job(ids[1], "running").await;
+    shutdown.cancel();
+    worker.stopped().await;
+    let mut states = Vec::new();
+    for id in ids {
+        states.push(queue.job(id, "state").await);
+    }
+    assert_eq!(states, ["succeeded", "succeeded", "available"]);
+}
+
+#[tokio::test]
+async fn a_shutdown_hands_back_what_does_not_end_and_no_attempt_is_counted() {
+    let queue = Queue::new().await;
+    let told = does("told", async |job| {
+        job.cancelled().await;
+        Err(JobError::Stopped)
+    });
+    let deaf = does("deaf", async |_| std::future::pending().await);
+    let (run_id, ids) = queue.run(&[jobs("told", 1), jobs("deaf", 1)].concat()).await;
+    let shutdown = CancellationToken::new();
+    let worker = queue.worker().handler(told).handler(deaf).concurrency(2);
+    let worker = worker.grace(Duration::from_millis(50)).patience(Duration::from_millis(50));
+    let worker = worker.start(shutdown.clone());
+    for id in &ids {
+        queue.wait_for_job(*id, "running").await;
+    }
+    shutdown.cancel();
+    worker.stopped().await;
+    for id in &ids {
+        assert_eq!(
+            (queue.job(*id, "state").await, queue.job(*id, "attempts").await),
+            ("available".into(), "0".into())
+        );
+    }
+    let next = queue.worker().handler(succeeds("told")).handler(succeeds("deaf"));
+    let _next = next.start(CancellationToken::new());
+    queue.wait_for_run(run_id, RunState::Succeeded).await;
+}
+
+#[tokio::test]
+async fn a_worker_that_never_reached_the_database_stops_at_once() {
+    let options = sqlx::postgres::PgConnectOptions::new_without_pgpass().socket("/nonexistent");
+    let pool = sqlx::postgres::PgPoolOptions::new().connect_lazy_with(options);
+    let shutdown = CancellationToken::new();
+    let worker = queue::Worker::builder(pool).handler(succeeds("chunk")).start(shutdown.clone());
+    assert!(!worker.is_connected());
+    shutdown.cancel();
+    tokio::time::timeout(Duration::from_secs(5), worker.stopped()).await.expect("a prompt stop");
+}
