@@ -63,6 +63,11 @@ impl Error {
     }
 }
 
+/// [`Error::Unexpected`] at an offset of a binary file.
+pub(crate) fn at_byte(offset: u64, found: impl Into<String>, expected: impl Into<String>) -> Error {
+    Error::Unexpected { place: Place::Byte(offset), found: found.into(), expected: expected.into() }
+}
+
 impl From<model::Error> for Error {
     fn from(source: model::Error) -> Self {
         Self::Model { place: Place::File, source }

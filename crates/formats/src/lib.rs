@@ -15,6 +15,7 @@
 pub mod amc;
 pub mod asf;
 pub mod bvh;
+pub mod c3d;
 mod error;
 mod euler;
 mod frame_rate;

@@ -1,0 +1,37 @@
+use nalgebra::Vector3;
+
+use super::{bytes::Processor, header::Header};
+use crate::{Result, error::at_byte};
+
+/// The samples of all frames in file units, row-major, shape `[frames, points]`; `None` was not measured.
+pub(super) fn read<'a>(
+    bytes: &'a [u8],
+    header: &'a Header,
+    processor: Processor,
+) -> Result<impl Iterator<Item = Option<Vector3<f64>>> + 'a> {
+    let width = header.width();
+    let (points, frame) = (4 * header.points * width, header.frame_bytes());
+    let data = header.frames.checked_mul(frame).and_then(|length| bytes[header.data..].get(..length));
+    let data = data.ok_or_else(|| {
+        at_byte(
+            header.data as u64,
+            "the end of the file",
+            format!("{} frames of {frame} bytes", header.frames),
+        )
+    })?;
+    let sample = move |bytes: &[u8]| {
+        let number = |index: usize| {
+            let at = index * width;
+            if width == 4 {
+                f64::from(processor.f32([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
+            } else {
+                f64::from(processor.i16([bytes[at], bytes[at + 1]]))
+            }
+        };
+        let factor = if width == 4 { 1.0 } else { header.scale };
+        let position = Vector3::new(number(0), number(1), number(2)) * factor;
+        // the fourth number holds the cameras and the residual; negative says that there was no measurement
+        (number(3) >= 0.0 && position.iter().all(|v| v.is_finite())).then_some(position)
+    };
+    Ok(data.chunks_exact(frame).flat_map(move |frame| frame[..points].chunks_exact(4 * width)).map(sample))
+}
