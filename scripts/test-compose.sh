@@ -69,4 +69,5 @@ say "the stack is up after $((SECONDS - start)) s, its gateway at $address"
 
 export MAREY_COMPOSE_URL=http://$address MAREY_COMPOSE_KEY=$MAREY_BOOTSTRAP_KEY MAREY_COMPOSE_COMMAND="${compose[*]}"
 # One after the other: they share the stack and change how many replicas it has.
-scripts/phase.sh "tests against the stack" cargo test --release --locked -p tests --test compose -- --test-threads=1
+scripts/phase.sh "tests against the stack" cargo test --release --locked --workspace --test compose \
+    -- --test-threads=1

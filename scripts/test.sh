@@ -15,7 +15,8 @@ phase() {
 }
 
 scripts/phase.sh "set-up" scripts/setup.sh
-phase "tests of the workspace" cargo test --release --locked --workspace --no-fail-fast
+phase "tests of the workspace" cargo test --release --locked --workspace --no-fail-fast \
+    -- --show-output
 case $compose in
 auto) if docker info >/dev/null 2>&1; then compose=always; else compose=never; fi ;;
 always | never) ;;
