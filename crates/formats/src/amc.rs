@@ -45,6 +45,18 @@ pub fn read(bytes: &[u8], acclaim: &asf::File, frame_rate: f64) -> Result<Read<M
     Ok(warnings.beside(motion))
 }
 
+/// Frames per second that the file states by `:SAMPLES-PER-SECOND`, as few files do.
+pub fn stated_frame_rate(bytes: &[u8]) -> Option<f64> {
+    let header = Lines::new(bytes).take_while(|line| frame_number(line.text).is_none());
+    for line in header.take(1000) {
+        let mut found = words(line.text);
+        if found.next().is_some_and(|key| key.eq_ignore_ascii_case(b":SAMPLES-PER-SECOND")) {
+            return found.next().and_then(finite).filter(|rate| *rate > 0.0);
+        }
+    }
+    None
+}
+
 /// Reads what comes before the first frame; gives radians per unit of angle and the first frame's line.
 fn header<'a>(lines: &mut Lines<'a>, warnings: &mut Warnings) -> Result<(f64, Line<'a>)> {
     let mut radians = None;
@@ -75,7 +87,7 @@ fn header<'a>(lines: &mut Lines<'a>, warnings: &mut Warnings) -> Result<(f64, Li
 
 /// A line with nothing but a whole number starts a frame.
 fn frame_number(text: &[u8]) -> Option<u64> {
-    if !text[0].is_ascii_digit() {
+    if !text.first().is_some_and(u8::is_ascii_digit) {
         return None;
     }
     std::str::from_utf8(text).ok()?.parse().ok()

@@ -43,6 +43,22 @@ pub enum Error {
         /// what is wrong with it
         source: model::Error,
     },
+    /// An archive or a compressed file that can't be unpacked.
+    #[error("{format} is damaged: {message}")]
+    Damaged {
+        /// what it is
+        format: &'static str,
+        /// what is wrong with it
+        message: String,
+    },
+    /// An archive has more of something than is allowed.
+    #[error("archive has more than {limit} {what}")]
+    Limit {
+        /// of what
+        what: &'static str,
+        /// how many are allowed
+        limit: u64,
+    },
     /// A file of several could not be read.
     #[error("{file}: {source}")]
     InFile {
@@ -58,8 +74,12 @@ impl Error {
         Self::Unexpected { place: Place::Line(line), found: found.into(), expected: expected.into() }
     }
 
-    pub(crate) fn in_file(found: impl Into<String>, expected: impl Into<String>) -> Self {
+    pub(crate) fn of_file(found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self::Unexpected { place: Place::File, found: found.into(), expected: expected.into() }
+    }
+
+    pub(crate) fn in_file(self, file: impl Into<String>) -> Self {
+        Self::InFile { file: file.into(), source: Box::new(self) }
     }
 }
 

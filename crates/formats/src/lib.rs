@@ -13,6 +13,7 @@
 //! ```
 
 pub mod amc;
+pub mod archive;
 pub mod asf;
 pub mod bvh;
 pub mod c3d;
@@ -20,6 +21,7 @@ mod error;
 mod euler;
 mod frame_rate;
 pub mod motion_csv;
+pub mod motion_files;
 mod points;
 pub mod points_csv;
 mod read;

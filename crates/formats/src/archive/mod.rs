@@ -1,0 +1,149 @@
+//! Files in zip, tar, tar.gz and tar.zst archives, and single files compressed with gzip or zstd.
+
+mod budget;
+mod decompress;
+mod name;
+mod tar;
+mod zip;
+
+use std::io::Read as _;
+
+use crate::{Error, Result};
+use budget::Budget;
+use decompress::Compression;
+
+/// How much an archive may unpack to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// bytes of all files together
+    pub total_bytes: u64,
+    /// number of files
+    pub entries: usize,
+    /// bytes of a file's name with its folders
+    pub name_bytes: usize,
+    /// unpacked bytes per packed byte, over the whole archive; 16 MiB are always allowed
+    pub ratio: u64,
+}
+
+impl Default for Limits {
+    /// 4 GiB in 100,000 files, names of 1,024 bytes; text of motion is packed 4 to 20 times, so 200 times is too much.
+    fn default() -> Self {
+        Self { total_bytes: 4 << 30, entries: 100_000, name_bytes: 1024, ratio: 200 }
+    }
+}
+
+/// A file of an archive, unpacked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// name with its folders, separated by `/`, without `..`, drive letters and the endings `.zst` and `.gz`
+    pub name: String,
+    /// content
+    pub bytes: Vec<u8>,
+}
+
+/// The files of an archive in its order; the kind of archive is told by its content. What is no archive is one entry
+/// with `name`, unpacked if it is compressed. Members compressed singly are unpacked; archives inside are not opened.
+///
+/// # Errors
+/// If the archive or a member is damaged, or exceeds the limits.
+pub fn entries(name: &str, bytes: &[u8], limits: &Limits) -> Result<Vec<Entry>> {
+    let mut unpacking = Unpacking::new(limits, bytes.len());
+    match Kind::of(bytes) {
+        Kind::Zip => zip::read(bytes, &mut unpacking)?,
+        Kind::Tar => tar::read(bytes, &mut unpacking)?,
+        Kind::Compressed(compression) => {
+            let stream = unpacking.stream();
+            let mut unpacked = stream.limit(compression.reader(bytes));
+            let mut head = Vec::new();
+            let read = unpacked.by_ref().take(tar::HEADER_BYTES).read_to_end(&mut head);
+            read.map_err(|e| stream.error(compression.name(), &e))?;
+            if tar::is_header(&head) {
+                tar::read(head.as_slice().chain(unpacked), &mut unpacking)?;
+            } else {
+                unpacked.read_to_end(&mut head).map_err(|e| stream.error(compression.name(), &e))?;
+                unpacking.push(name::without_compression(name).as_bytes(), head)?;
+            }
+        }
+        Kind::Plain => unpacking.push(name.as_bytes(), bytes.to_vec())?,
+    }
+    Ok(unpacking.entries)
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Zip,
+    Tar,
+    Compressed(Compression),
+    Plain,
+}
+
+impl Kind {
+    fn of(bytes: &[u8]) -> Self {
+        if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06") {
+            return Self::Zip;
+        }
+        match Compression::of(bytes) {
+            Some(compression) => Self::Compressed(compression),
+            None if tar::is_header(bytes) => Self::Tar,
+            None => Self::Plain,
+        }
+    }
+}
+
+/// The entries so far, and how much more may come.
+struct Unpacking {
+    limits: Limits,
+    budget: Budget,
+    entries: Vec<Entry>,
+}
+
+impl Unpacking {
+    fn new(limits: &Limits, packed_bytes: usize) -> Self {
+        const FREE: u64 = 16 << 20;
+        let by_ratio = (packed_bytes as u64).saturating_mul(limits.ratio).saturating_add(FREE);
+        let budget = Budget::new(limits.total_bytes.min(by_ratio));
+        Self { limits: *limits, budget, entries: Vec::new() }
+    }
+
+    /// A budget of its own for the archive's stream, from which the members are then taken.
+    fn stream(&self) -> Budget {
+        Budget::new(self.budget.limit_bytes())
+    }
+
+    /// The bytes of a member.
+    fn read(&self, format: &'static str, member: &[u8], reader: impl std::io::Read) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let read = self.budget.limit(reader).read_to_end(&mut bytes);
+        read.map_err(|e| self.budget.error(format, &e).in_file(name::shown(member)))?;
+        Ok(bytes)
+    }
+
+    /// Takes a member, unpacked if it is compressed singly.
+    fn push_member(&mut self, member: &[u8], bytes: Vec<u8>) -> Result<()> {
+        match Compression::of(&bytes).filter(|c| c.is_named(member)) {
+            None => self.push(member, bytes),
+            Some(compression) => {
+                let unpacked = self.read(compression.name(), member, compression.reader(&bytes))?;
+                self.push(name::without_compression(&String::from_utf8_lossy(member)).as_bytes(), unpacked)
+            }
+        }
+    }
+
+    fn push(&mut self, name: &[u8], bytes: Vec<u8>) -> Result<()> {
+        self.check_next(name)?;
+        self.entries.push(Entry { name: name::clean(name), bytes });
+        Ok(())
+    }
+
+    /// Refuses a member whose name is too long, and one more than there may be.
+    fn check_next(&self, name: &[u8]) -> Result<()> {
+        if self.entries.len() >= self.limits.entries {
+            return Err(Error::Limit { what: "files", limit: self.limits.entries as u64 });
+        }
+        if name.len() > self.limits.name_bytes {
+            let limit = Error::Limit { what: "bytes in a name", limit: self.limits.name_bytes as u64 };
+            return Err(limit.in_file(name::shown(name)));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,30 @@
+use std::io::Cursor;
+
+use super::{Unpacking, name};
+use crate::{Error, Result};
+
+const FORMAT: &str = "zip";
+
+/// Files only: folders and symbolic links are skipped.
+pub(super) fn read(bytes: &[u8], unpacking: &mut Unpacking) -> Result<()> {
+    let damaged = |e: ::zip::result::ZipError| Error::Damaged { format: FORMAT, message: e.to_string() };
+    let mut archive = ::zip::ZipArchive::new(Cursor::new(bytes)).map_err(damaged)?;
+    for index in 0..archive.len() {
+        let member = archive.by_index(index).map_err(|e| {
+            let place = format!("member {index}");
+            damaged(e).in_file(place)
+        })?;
+        if !member.is_file() {
+            continue;
+        }
+        let name = member.name_raw().to_vec();
+        unpacking.check_next(&name)?;
+        if member.encrypted() {
+            let message = "the member is encrypted".into();
+            return Err(Error::Damaged { format: FORMAT, message }.in_file(name::shown(&name)));
+        }
+        let content = unpacking.read(FORMAT, &name, member)?;
+        unpacking.push_member(&name, content)?;
+    }
+    Ok(())
+}

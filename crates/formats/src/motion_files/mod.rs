@@ -1,0 +1,137 @@
+//! From the files of an archive to motions: AMC with its ASF, and BVH.
+
+mod index;
+mod pairing;
+mod path;
+
+use std::{cell::OnceCell, sync::Arc};
+
+use model::Motion;
+
+use crate::{Error, Place, Read, Result, Warning, amc, archive::Entry, asf, bvh, text::Names};
+use index::Indices;
+use pairing::Skeletons;
+use path::Path;
+
+/// What to do with a file that can't be read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Broken {
+    /// give up and name it
+    #[default]
+    Refuse,
+    /// leave it out, with a warning
+    Skip,
+}
+
+/// What the files may not say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// frames per second of AMC files for which neither `index.csv` nor the file has another; 120 by default, as in
+    /// the CMU database
+    pub amc_frame_rate: f64,
+    /// unit of BVH files
+    pub bvh: bvh::Options,
+    /// what to do with a file that can't be read
+    pub broken: Broken,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { amc_frame_rate: 120.0, bvh: bvh::Options::default(), broken: Broken::default() }
+    }
+}
+
+/// A motion and where it comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionFile {
+    /// name of the file without folders and ending, `16_15`
+    pub name: String,
+    /// the person, `16`: column `subject` of `index.csv`, else the name before the first `_`
+    pub subject: String,
+    /// what is done, column `action` of `index.csv`; empty if unknown
+    pub action: String,
+    /// the motion
+    pub motion: Motion,
+}
+
+/// The motions of all AMC and BVH files, in the order of their paths.
+///
+/// An AMC file belongs to the ASF file whose name is the longest beginning of its own up to a `_` (`16_15.amc` to
+/// `16.asf`), first in the same folder, then elsewhere; else to the only ASF file of its folder, else to the only one.
+/// Files named `index.csv` may give the columns `file` or `trial`, and `action`, `subject` and `fps` (of AMC).
+/// Hidden files and all others are left alone.
+///
+/// # Errors
+/// If a file can't be read and is not to be skipped, or there is no motion at all. The file is named.
+pub fn clips(entries: &[Entry], options: &Options) -> Result<Read<Vec<MotionFile>>> {
+    let mut files: Vec<(Path<'_>, &Entry)> = entries.iter().map(|e| (Path::of(&e.name), e)).collect();
+    files.retain(|(path, _)| !path.is_hidden());
+    files.sort_by(|(_, a), (_, b)| a.name.cmp(&b.name));
+    let mut warnings = Vec::new();
+    let indices = Indices::read(&files)?;
+    let skeletons = Skeletons::new(&files);
+    let mut names = Names::default();
+    let mut clips = Vec::new();
+    for (path, entry) in &files {
+        let row = indices.row(path);
+        let read = if path.has_extension("amc") {
+            let stated = row.and_then(|r| r.frame_rate).or_else(|| amc::stated_frame_rate(&entry.bytes));
+            skeletons.read_amc(path, &entry.bytes, stated.unwrap_or(options.amc_frame_rate))
+        } else if path.has_extension("bvh") {
+            bvh::read(&entry.bytes, &options.bvh)
+        } else {
+            continue;
+        };
+        let read = match (read, options.broken) {
+            (Ok(read), _) => read,
+            (Err(e), Broken::Refuse) => return Err(named(e, &entry.name)),
+            (Err(e), Broken::Skip) => {
+                let message = format!("{} is left out", named(e, &entry.name));
+                warnings.push(Warning { place: Place::File, message });
+                continue;
+            }
+        };
+        let in_file = read.warnings.iter().map(|w| format!("{}: {w}", entry.name));
+        warnings.extend(in_file.map(|message| Warning { place: Place::File, message }));
+        let name = names.unique(path.stem);
+        if name != path.stem {
+            let message = format!("{}: a second motion named {} is called {name}", entry.name, path.stem);
+            warnings.push(Warning { place: Place::File, message });
+        }
+        let subject = row.map(|r| r.subject.clone()).filter(|s| !s.is_empty());
+        clips.push(MotionFile {
+            subject: subject.unwrap_or_else(|| path.subject().to_owned()),
+            action: row.map(|r| r.action.clone()).unwrap_or_default(),
+            name,
+            motion: read.value,
+        });
+    }
+    if clips.is_empty() {
+        let skipped = warnings.iter().map(|w| w.message.as_str()).next();
+        let found =
+            skipped.map_or_else(|| format!("{} files, no motion among them", files.len()), str::to_owned);
+        return Err(Error::of_file(found, "at least one AMC file with its ASF file, or a BVH file"));
+    }
+    Ok(Read { value: clips, warnings })
+}
+
+fn named(error: Error, file: &str) -> Error {
+    match error {
+        // the file that is broken is the ASF, which is named already
+        Error::InFile { .. } => error,
+        other => other.in_file(file),
+    }
+}
+
+/// A skeleton that is read when it is needed first.
+struct LazySkeleton<'e> {
+    entry: &'e Entry,
+    file: OnceCell<Result<Arc<asf::File>>>,
+}
+
+impl LazySkeleton<'_> {
+    fn get(&self) -> Result<Arc<asf::File>> {
+        let read = || asf::read(&self.entry.bytes).map(|r| Arc::new(r.value));
+        self.file.get_or_init(|| read().map_err(|e| e.in_file(&self.entry.name))).clone()
+    }
+}
