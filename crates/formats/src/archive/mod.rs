@@ -50,7 +50,10 @@ pub fn entries(name: &str, bytes: &[u8], limits: &Limits) -> Result<Vec<Entry>> 
     let mut unpacking = Unpacking::new(limits, bytes.len());
     match Kind::of(bytes) {
         Kind::Zip => zip::read(bytes, &mut unpacking)?,
-        Kind::Tar => tar::read(bytes, &mut unpacking)?,
+        Kind::Tar => {
+            let stream = unpacking.stream();
+            tar::read(stream.limit(bytes), &stream, &mut unpacking)?;
+        }
         Kind::Compressed(compression) => {
             let stream = unpacking.stream();
             let mut unpacked = stream.limit(compression.reader(bytes));
@@ -58,7 +61,7 @@ pub fn entries(name: &str, bytes: &[u8], limits: &Limits) -> Result<Vec<Entry>> 
             let read = unpacked.by_ref().take(tar::HEADER_BYTES).read_to_end(&mut head);
             read.map_err(|e| stream.error(compression.name(), &e))?;
             if tar::is_header(&head) {
-                tar::read(head.as_slice().chain(unpacked), &mut unpacking)?;
+                tar::read(head.as_slice().chain(unpacked), &stream, &mut unpacking)?;
             } else {
                 unpacked.read_to_end(&mut head).map_err(|e| stream.error(compression.name(), &e))?;
                 unpacking.push(name::without_compression(name).as_bytes(), head)?;

@@ -1,6 +1,6 @@
 use std::io::Read;
 
-use super::Unpacking;
+use super::{Unpacking, budget::Budget};
 use crate::{Error, Result};
 
 /// Bytes of a header.
@@ -20,10 +20,9 @@ pub(super) fn is_header(bytes: &[u8]) -> bool {
     stated == Some(sum.sum()) && header[0] != 0
 }
 
-/// Regular files only: folders, links and devices are skipped.
-pub(super) fn read(reader: impl Read, unpacking: &mut Unpacking) -> Result<()> {
-    let stream = unpacking.stream();
-    let mut archive = ::tar::Archive::new(stream.limit(reader));
+/// Regular files only: folders, links and devices are skipped. `reader` is charged to `stream`.
+pub(super) fn read(reader: impl Read, stream: &Budget, unpacking: &mut Unpacking) -> Result<()> {
+    let mut archive = ::tar::Archive::new(reader);
     for entry in archive.entries().map_err(|e| stream.error(FORMAT, &e))? {
         let entry = entry.map_err(|e| stream.error(FORMAT, &e))?;
         if !entry.header().entry_type().is_file() {
