@@ -7,6 +7,7 @@ use futures::future::BoxFuture;
 use sqlx::PgConnection;
 use tokio::task::JoinError;
 use tokio::time::{Instant, timeout};
+use tokio_util::task::AbortOnDropHandle;
 use tracing::Instrument;
 
 use super::Shared;
@@ -53,14 +54,15 @@ enum End {
 async fn run(shared: &Shared, handler: Arc<dyn DynHandler>, job: &Arc<ClaimedJob>, held: &Arc<Held>) -> End {
     let context = JobContext::new(job.clone(), held.clone());
     // A task of its own: a panic ends the task, not the worker.
-    let mut task = tokio::spawn(async move { handler.run(context).await }.in_current_span());
+    let task = tokio::spawn(async move { handler.run(context).await }.in_current_span());
+    // Aborts it when it is left behind, or the whole worker is.
+    let mut task = AbortOnDropHandle::new(task);
     let result = tokio::select! {
         result = &mut task => Some(result),
         () = held.stop.cancelled() => timeout(shared.patience, &mut task).await.ok(),
     };
     if result.is_none() {
         tracing::warn!(reason = ?held.stopped(), "handler did not stop when told to, left behind");
-        task.abort();
     }
     match (result, held.stopped()) {
         (_, Some(Stop::LeaseLost)) => End::Drop,

@@ -11,7 +11,7 @@ use sqlx::PgPool;
 use sqlx::postgres::PgConnectOptions;
 use tokio_util::sync::CancellationToken;
 
-use crate::support::{Queue, does, jobs, quick, succeeds};
+use crate::support::{Queue, does, jobs, quick, succeeds, wait_until};
 
 /// Tells the child process of a test where the queue is.
 const CHILD_DATABASE: &str = "QUEUE_TEST_CHILD_DATABASE";
@@ -93,9 +93,9 @@ async fn a_worker_that_is_dropped_loses_its_jobs_to_another() {
             Ok(Outcome::default())
         }
     });
-    let (run_id, ids) = queue.run(&jobs("chunk", 1)).await;
+    let (run_id, _) = queue.run(&jobs("chunk", 1)).await;
     let first = queue.worker().handler(handler.clone()).start(CancellationToken::new());
-    queue.wait_for_job(ids[0], "running").await;
+    wait_until("the first attempt", async || (runs.load(Ordering::SeqCst) == 1).then_some(())).await;
     first.abort();
     let _second = queue.worker().handler(handler).start(CancellationToken::new());
     queue.wait_for_run(run_id, RunState::Succeeded).await;

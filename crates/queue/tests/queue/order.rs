@@ -33,8 +33,8 @@ async fn a_small_project_does_not_wait_behind_a_big_one() {
     // The big one has 4 running; a third project gets as many before the big one gets a fifth.
     let third = ProjectId(Uuid::new_v4());
     queue.run_of(third, &jobs("chunk", 50)).await;
-    let batch = queue.claim("chunk", 5).await;
-    assert_eq!(batch.iter().filter(|job| job.project_id == third).count(), 5);
+    let batch = queue.claim("chunk", 4).await;
+    assert!(batch.iter().all(|job| job.project_id == third));
 }
 
 #[tokio::test]

@@ -33,7 +33,7 @@ async fn illegal_rows_are_refused_by_name() {
         ("progress = 'NaN'", "jobs_progress_check"),
         ("weight = 0", "jobs_weight_check"),
         ("weight = 'NaN'", "jobs_weight_check"),
-        ("max_attempts = 0", "jobs_max_attempts_check"),
+        ("max_attempts = 1001", "jobs_max_attempts_check"),
     ];
     for (change, constraint) in refusals {
         // A new state is first seen by the trigger, so illegal steps have their own test.
