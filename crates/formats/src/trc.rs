@@ -28,66 +28,91 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
     let header = Header::read(&mut lines, &mut warnings)?;
     let points = header.names.len();
     let max_frames = points::max_frames(bytes.len(), points);
-    let mut times = Times::default();
-    let mut positions = Vec::new();
-    let mut at_origin = 0;
+    let mut rows = Rows { points, max_frames, ..Rows::default() };
     while let Some(line) = lines.next_untrimmed() {
-        let mut cells = cells(line.text);
-        let frame = cells.next().unwrap_or_default();
-        let Some(time) = cells.next() else {
-            if frame.is_empty() {
-                continue;
-            }
-            return Err(Error::at_line(line.number, quote(line.text), "a frame number and a time"));
-        };
-        if frame.is_empty() && time.is_empty() && cells.clone().all(<[u8]>::is_empty) {
-            continue;
-        }
-        times.push(line.number, time)?;
-        if positions.len() / points >= max_frames {
-            let found = format!("row {} of {points} markers", positions.len() / points + 1);
-            return Err(Error::at_line(line.number, found, "rows with a cell for each coordinate"));
-        }
-        let start = positions.len();
-        positions.resize(start + points, Vector3::repeat(f64::NAN));
-        for (index, cell) in cells.enumerate() {
-            let value = coordinate(line.number, cell)?;
-            match positions.get_mut(start + index / 3) {
-                Some(position) => position[index % 3] = value * header.metres,
-                None if value.is_nan() => {}
-                None => {
-                    let found = format!("more than {} coordinates", 3 * points);
-                    return Err(Error::at_line(
-                        line.number,
-                        found,
-                        format!("three for each of {points} markers"),
-                    ));
-                }
-            }
-        }
-        for position in &mut positions[start..] {
-            if *position == Vector3::zeros() {
-                at_origin += 1;
-                *position = Vector3::repeat(f64::NAN);
-            }
-            *position = points::y_up(up, *position);
-        }
+        rows.push(line)?;
     }
-    if positions.is_empty() {
+    if rows.positions.is_empty() {
         return Err(Error::at_line(lines.number(), "the end of the file", "a row of a frame"));
+    }
+    if rows.short > 0 {
+        let message =
+            format!("{} rows end early; the markers that they leave out count as missing", rows.short);
+        warnings.add(Place::File, message);
+    }
+    let mut at_origin = 0;
+    for position in &mut rows.positions {
+        let is_origin = *position == Vector3::zeros();
+        at_origin += usize::from(is_origin);
+        let measured = if is_origin { Vector3::repeat(f64::NAN) } else { *position * header.metres };
+        *position = points::y_up(up, measured);
     }
     if at_origin > 0 {
         warnings.add(Place::File, format!("{at_origin} samples at exactly 0 0 0 count as missing"));
     }
-    let rows = positions.len() / points;
-    header.check_rows(rows, &mut warnings);
-    let grid = times.grid(header.rate, max_frames, &mut warnings)?;
-    let trajectories = points::place(header.names, &positions, &grid)?;
+    header.check_rows(rows.positions.len() / points, &mut warnings);
+    let grid = rows.times.grid(header.rate, max_frames, &mut warnings)?;
+    let trajectories = points::place(header.names, &rows.positions, &grid)?;
     Ok(warnings.beside(trajectories))
 }
 
+/// The rows read so far.
+#[derive(Default)]
+struct Rows {
+    points: usize,
+    max_frames: usize,
+    times: Times,
+    /// file units, shape `[rows, points]`
+    positions: Vec<Vector3<f64>>,
+    /// rows that end before the last marker
+    short: usize,
+}
+
+impl Rows {
+    fn push(&mut self, line: Line<'_>) -> Result<()> {
+        if line.text.trim_ascii().is_empty() {
+            return Ok(());
+        }
+        let mut cells = cells(line.text).skip(1);
+        let time = cells.next();
+        let time =
+            time.ok_or_else(|| Error::at_line(line.number, quote(line.text), "a frame number and a time"))?;
+        self.times.push(line.number, time)?;
+        let start = self.positions.len();
+        if start / self.points >= self.max_frames {
+            let found = format!("row {} of {} markers", start / self.points + 1, self.points);
+            return Err(Error::at_line(line.number, found, "rows with a cell for each coordinate"));
+        }
+        self.positions.resize(start + self.points, Vector3::repeat(f64::NAN));
+        let row = &mut self.positions[start..];
+        let coordinates = 3 * self.points;
+        let mut found = 0;
+        for cell in cells {
+            let value = coordinate(line.number, cell)?;
+            match row.get_mut(found / 3) {
+                Some(position) => position[found % 3] = value,
+                None if value.is_nan() => {}
+                None => {
+                    let found = format!("more than {coordinates} coordinates");
+                    let expected = format!("three for each of {} markers", self.points);
+                    return Err(Error::at_line(line.number, found, expected));
+                }
+            }
+            found += 1;
+        }
+        if found < coordinates {
+            if found % 3 != 0 && !row[found / 3].iter().all(|v| v.is_nan()) {
+                let found = format!("a row that ends after {found} of {coordinates} coordinates");
+                return Err(Error::at_line(line.number, found, "three for each marker"));
+            }
+            self.short += 1;
+        }
+        Ok(())
+    }
+}
+
 /// The cells of a line, without blanks around them.
-fn cells(text: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
+fn cells(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(|b| *b == b'\t').map(<[u8]>::trim_ascii)
 }
 
