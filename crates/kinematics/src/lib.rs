@@ -29,7 +29,7 @@ pub use error::Error;
 pub use euler::{angles_from_rotation, nearest_equivalent, rotation_from_angles, unwrap_near};
 pub use forward::{Kinematics, State};
 pub use jacobian::check_jacobian;
-pub use parametrisation::{HEADING, Parametrisation, ROOT_DOFS};
+pub use parametrisation::{HEADING, Parametrisation, ROOT_DOFS, References};
 pub use points::{ControlPoint, PointSet, control_points};
 pub use rotation_vector::{left_jacobian, nearest_rotation_vector, rotation_exp, rotation_log};
 

@@ -1,3 +1,5 @@
+use std::f64::consts::PI;
+
 use model::{Axis, Channel, ChannelKind, Skeleton};
 use nalgebra::{Matrix3, Vector3};
 
@@ -21,31 +23,52 @@ pub(crate) enum JointRotation {
     HeadingTilt { first_dof: usize },
 }
 
+/// What smooth coordinates are measured from: the middle of each joint's range, so that what is far from it is rare.
+#[derive(Debug, Clone, PartialEq)]
+pub struct References {
+    /// product of each joint's channel rotations, shape `[num_joints]`; used for joints with three rotations
+    pub rotations: Vec<Matrix3<f64>>,
+    /// angle (radians) of each DOF, shape `[dofs]`; used for joints with one or two rotations
+    pub angles: Vec<f64>,
+}
+
+impl References {
+    /// The rest pose.
+    pub fn rest(skeleton: &Skeleton) -> Self {
+        Self {
+            rotations: vec![Matrix3::identity(); skeleton.num_joints()],
+            angles: vec![0.0; skeleton.num_dofs()],
+        }
+    }
+}
+
 /// The meaning of the D coordinates that stand for a pose.
 ///
 /// *Channels* are the file's own numbers. *Smooth* coordinates have the same length, but a free root is
 /// `x y z heading tilt_x tilt_z` with heading taken out as the leftmost rotation about y (method §2, mends 1 and 2:
 /// Acclaim's order is singular at headings of ±90°), and every joint with three rotations has a rotation vector
-/// about a reference rotation, which has no gimbal pole. Joints with one or two rotations keep their angles.
+/// about a reference rotation, which has no gimbal pole. Joints with one or two rotations keep their angles. Angles
+/// lie within half a turn of their reference (recorded thumbs run on for several turns); only the heading runs on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parametrisation {
     pub(crate) joints: Vec<JointRotation>,
     pub(crate) translations: Vec<Vec<(usize, Axis)>>,
+    /// middle of each angle's range, shape `[dofs]`
+    centres: Vec<f64>,
 }
 
 impl Parametrisation {
     /// The file's own channels.
     pub fn channels(skeleton: &Skeleton) -> Self {
         let joints = (0..skeleton.num_joints()).map(|j| channel_angles(skeleton, j)).collect();
-        Self { joints, translations: translations(skeleton) }
+        Self { joints, translations: translations(skeleton), centres: vec![0.0; skeleton.num_dofs()] }
     }
 
-    /// Smooth coordinates. `references`: rotation of each joint (product of its channels) about which its rotation
-    /// vector is taken, shape `[num_joints]`; only those of joints with three rotations are used.
+    /// Smooth coordinates about `references`.
     ///
     /// # Errors
     /// If the root does not have three translations and three rotations.
-    pub fn smooth(skeleton: &Skeleton, references: &[Matrix3<f64>]) -> Result<Self> {
+    pub fn smooth(skeleton: &Skeleton, references: &References) -> Result<Self> {
         let root = &skeleton.joints()[0];
         if root.channels.len() != ROOT_DOFS || root.num_rotations() != 3 {
             let channels = root.channels.iter().map(Channel::to_string).collect::<Vec<_>>().join(" ");
@@ -59,7 +82,7 @@ impl Parametrisation {
             } else if joint.num_rotations() == 3 {
                 // The joint's translations, if any, come first among its coordinates.
                 let first_dof = skeleton.dofs(j).end - 3;
-                JointRotation::Vector { first_dof, reference: references[j] }
+                JointRotation::Vector { first_dof, reference: references.rotations[j] }
             } else {
                 channel_angles(skeleton, j)
             }
@@ -74,7 +97,7 @@ impl Parametrisation {
             }
             debug_assert!(joint.channels.len() == skeleton.dofs(j).len());
         }
-        Ok(Self { joints, translations })
+        Ok(Self { joints, translations, centres: references.angles.clone() })
     }
 
     /// Whether the coordinate is an angle in radians (otherwise a translation in metres).
@@ -82,18 +105,17 @@ impl Parametrisation {
         !self.translations.iter().flatten().any(|(d, _)| *d == dof)
     }
 
-    /// Smooth coordinates of a pose. `pose`: channel values, metres and radians, shape `[dofs]`; `previous`:
-    /// coordinates near which angles are unwrapped; `out`: coordinates, shape `[dofs]`.
+    /// Smooth coordinates of a pose. `pose`: channel values, metres and radians, shape `[dofs]`; `previous_heading`
+    /// (radians): the heading is unwrapped to it; `out`: coordinates, shape `[dofs]`.
     pub fn coordinates_from_pose(
         &self,
         skeleton: &Skeleton,
         pose: &[f64],
-        previous: Option<&[f64]>,
+        previous_heading: f64,
         out: &mut [f64],
     ) {
         for (j, joint) in skeleton.joints().iter().enumerate() {
             let base = skeleton.dofs(j).start;
-            let near = |dof: usize| previous.map_or(0.0, |p| p[dof]);
             for (dof, axis) in &self.translations[j] {
                 out[*dof] = base_value(&joint.channels, base, ChannelKind::Translation, *axis, pose);
             }
@@ -101,24 +123,43 @@ impl Parametrisation {
                 JointRotation::Angles(angles) => {
                     for (dof, axis) in angles {
                         let angle = base_value(&joint.channels, base, ChannelKind::Rotation, *axis, pose);
-                        out[*dof] = unwrap_near(angle, near(*dof));
+                        out[*dof] = unwrap_near(angle, self.centres[*dof]);
                     }
                 }
                 JointRotation::Vector { first_dof, reference } => {
                     let rotation = channel_rotation(skeleton, j, pose);
                     let v = rotation_log(&(reference.transpose() * rotation));
-                    let near = Vector3::new(near(*first_dof), near(first_dof + 1), near(first_dof + 2));
-                    let v = nearest_rotation_vector(&v, &near);
                     out[*first_dof..first_dof + 3].copy_from_slice(v.as_slice());
                 }
                 JointRotation::HeadingTilt { first_dof } => {
                     let axes = joint.axes.matrix();
                     let world = axes * channel_rotation(skeleton, j, pose) * axes.transpose();
                     let (heading, tilt) = heading_and_tilt(&world);
-                    out[*first_dof] = unwrap_near(heading, near(*first_dof));
+                    out[*first_dof] = unwrap_near(heading, previous_heading);
                     out[first_dof + 1] = tilt.x;
                     out[first_dof + 2] = tilt.z;
                 }
+            }
+        }
+    }
+
+    /// Brings every angle but the heading back to within half a turn of its reference, in place: the same pose.
+    pub fn wrap(&self, x: &mut [f64]) {
+        for joint in &self.joints {
+            match joint {
+                JointRotation::Angles(angles) => {
+                    for (dof, _) in angles {
+                        x[*dof] = unwrap_near(x[*dof], self.centres[*dof]);
+                    }
+                }
+                JointRotation::Vector { first_dof, .. } => {
+                    let v = Vector3::new(x[*first_dof], x[first_dof + 1], x[first_dof + 2]);
+                    if v.norm() > PI {
+                        let v = nearest_rotation_vector(&v, &Vector3::zeros());
+                        x[*first_dof..first_dof + 3].copy_from_slice(v.as_slice());
+                    }
+                }
+                JointRotation::HeadingTilt { .. } => {}
             }
         }
     }

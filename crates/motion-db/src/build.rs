@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use kinematics::{Kinematics, Parametrisation, rotation_from_angles};
+use kinematics::{HEADING, Kinematics, Parametrisation, References, rotation_from_angles, unwrap_near};
 use model::{Motion, Skeleton};
 use nalgebra::Matrix3;
 
@@ -59,7 +59,7 @@ impl MotionDatabase {
         for clip in clips {
             check_structure(clip, first)?;
         }
-        let references = mean_rotations(clips);
+        let references = mean_references(clips);
         let parametrisation = Parametrisation::smooth(&skeleton, &references)
             .map_err(|source| Error::Skeleton { clip: first.name.clone(), source })?;
         let leg_length = clips.iter().map(|c| SkeletonSize::leg_length(c.motion.skeleton())).sum::<f64>()
@@ -108,16 +108,17 @@ impl MotionDatabase {
     }
 }
 
-/// Coordinates of a motion at 60 frames a second, shape `[frames, dofs]`, continuous in time. Whole ratios of the
+/// Coordinates of a motion at 60 frames a second, shape `[frames, dofs]`, the heading continuous in time. Whole ratios of the
 /// frame rates take every n-th frame; others interpolate linearly in the coordinates.
 pub fn resample(motion: &Motion, parametrisation: &Parametrisation) -> Vec<f64> {
     let skeleton = motion.skeleton();
     let dofs = skeleton.num_dofs();
     let mut all = vec![0.0; motion.values().len()];
+    let mut heading = 0.0;
     for frame in 0..motion.num_frames() {
-        let (done, rest) = all.split_at_mut(frame * dofs);
-        let previous = (frame > 0).then(|| &done[(frame - 1) * dofs..]);
-        parametrisation.coordinates_from_pose(skeleton, motion.pose(frame), previous, &mut rest[..dofs]);
+        let out = &mut all[frame * dofs..][..dofs];
+        parametrisation.coordinates_from_pose(skeleton, motion.pose(frame), heading, out);
+        heading = out[HEADING];
     }
     let ratio = motion.frame_rate() / FRAME_RATE;
     let whole = ratio.round();
@@ -133,19 +134,27 @@ pub fn resample(motion: &Motion, parametrisation: &Parametrisation) -> Vec<f64> 
         let high = (low + 1).min(motion.num_frames() - 1);
         let share = at - low as f64;
         let (a, b) = (&all[low * dofs..][..dofs], &all[high * dofs..][..dofs]);
-        out.extend(a.iter().zip(b).map(|(a, b)| a + share * (b - a)));
+        out.extend(a.iter().zip(b).enumerate().map(|(d, (a, b))| {
+            let b = if parametrisation.is_angle(d) { unwrap_near(*b, *a) } else { *b };
+            a + share * (b - a)
+        }));
     }
     out
 }
 
-/// The rotation nearest to the mean of each joint's channel rotations over all clips, shape `[num_joints]`.
-fn mean_rotations(clips: &[Clip]) -> Vec<Matrix3<f64>> {
+/// Mean rotation of each joint with three rotations, circular mean of every other angle, over all clips.
+fn mean_references(clips: &[Clip]) -> References {
     let skeleton: &Arc<Skeleton> = clips[0].motion.skeleton();
     let mut sums = vec![Matrix3::zeros(); skeleton.num_joints()];
+    let mut circular = vec![(0.0, 0.0); skeleton.num_dofs()];
     for clip in clips {
         // Every 10th frame is plenty for a mean.
         for frame in (0..clip.motion.num_frames()).step_by(10) {
             let pose = clip.motion.pose(frame);
+            for ((sin, cos), angle) in circular.iter_mut().zip(pose) {
+                *sin += angle.sin();
+                *cos += angle.cos();
+            }
             for (j, joint) in skeleton.joints().iter().enumerate().filter(|(_, j)| j.num_rotations() == 3) {
                 let channels = &pose[skeleton.dofs(j)];
                 let mut angles = [0.0; 3];
@@ -158,7 +167,10 @@ fn mean_rotations(clips: &[Clip]) -> Vec<Matrix3<f64>> {
             }
         }
     }
-    sums.iter().map(nearest_rotation).collect()
+    References {
+        rotations: sums.iter().map(nearest_rotation).collect(),
+        angles: circular.iter().map(|(sin, cos)| sin.atan2(*cos)).collect(),
+    }
 }
 
 /// The rotation nearest to a matrix (orthogonal Procrustes); identity where the matrix says nothing.

@@ -1,8 +1,7 @@
 use std::sync::Arc;
 
-use kinematics::{Kinematics, Parametrisation};
+use kinematics::{Kinematics, Parametrisation, References};
 use model::Skeleton;
-use nalgebra::Matrix3;
 
 /// Frames per second of every database.
 pub const FRAME_RATE: f64 = 60.0;
@@ -29,7 +28,7 @@ pub struct ClipInfo {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionDatabase {
     pub(crate) skeleton: Arc<Skeleton>,
-    pub(crate) references: Vec<Matrix3<f64>>,
+    pub(crate) references: References,
     pub(crate) parametrisation: Parametrisation,
     pub(crate) leg_length: f64,
     pub(crate) clips: Vec<ClipInfo>,

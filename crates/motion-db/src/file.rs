@@ -1,4 +1,4 @@
-use kinematics::Parametrisation;
+use kinematics::{Parametrisation, References};
 use model::{Skeleton, SkeletonRecord};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,8 @@ const CHECKSUM: usize = 32;
 #[derive(Serialize, Deserialize)]
 struct Header {
     skeleton: SkeletonRecord,
-    references: Vec<[[f64; 3]; 3]>,
+    reference_rotations: Vec<[[f64; 3]; 3]>,
+    reference_angles: Vec<f64>,
     leg_length_m: f64,
     clips: Vec<ClipRecord>,
 }
@@ -48,7 +49,8 @@ impl MotionDatabase {
     pub fn to_bytes(&self) -> Vec<u8> {
         let header = Header {
             skeleton: SkeletonRecord::from(self.skeleton.as_ref()),
-            references: self.references.iter().map(|m| (*m).into()).collect(),
+            reference_rotations: self.references.rotations.iter().map(|m| (*m).into()).collect(),
+            reference_angles: self.references.angles.clone(),
             leg_length_m: self.leg_length,
             clips: self
                 .clips
@@ -119,13 +121,13 @@ impl MotionDatabase {
 
     fn from_parts(header: Header, data: &[u8]) -> std::result::Result<Self, String> {
         let skeleton = Skeleton::try_from(header.skeleton).map_err(|e| e.to_string())?;
-        let references: Vec<Matrix3<f64>> = header.references.into_iter().map(Matrix3::from).collect();
-        if references.len() != skeleton.num_joints() {
-            return Err(format!(
-                "{} reference rotations for {} joints",
-                references.len(),
-                skeleton.num_joints()
-            ));
+        let references = References {
+            rotations: header.reference_rotations.into_iter().map(Matrix3::from).collect(),
+            angles: header.reference_angles,
+        };
+        let (rotations, angles) = (references.rotations.len(), references.angles.len());
+        if rotations != skeleton.num_joints() || angles != skeleton.num_dofs() {
+            return Err(format!("{rotations} reference rotations and {angles} angles for another skeleton"));
         }
         if !(header.leg_length_m.is_finite() && header.leg_length_m > 0.0) {
             return Err(format!("a leg length of {} m", header.leg_length_m));

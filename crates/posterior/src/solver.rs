@@ -29,6 +29,16 @@ pub struct Solution {
     pub prior_energy: f64,
     /// root mean square distance of the measured points, metres; 0 if none was measured
     pub residual_m: f64,
+    /// log of the determinant of `JΣJᵀ + W⁻¹`, the covariance that the prior predicts for the measurements, metres²
+    pub log_determinant: f64,
+}
+
+impl Solution {
+    /// Minus the log of the probability density that the prior gave to the measurements (up to a constant): it grows when
+    /// they are far from what was predicted and when the prediction was vague.
+    pub fn surprise(&self) -> f64 {
+        0.5 * (self.likelihood_energy + self.prior_energy + self.log_determinant)
+    }
 }
 
 /// Finds the pose of least energy, keeping its memory from frame to frame.
@@ -102,6 +112,7 @@ impl MapSolver {
         let mut prior_energy = 0.0;
         let mut damping = 0.0;
         let mut steps = 0;
+        let mut log_determinant = 0.0;
         let mut is_new_point = true;
         while steps < parameters.max_steps && rows > 0 {
             steps += 1;
@@ -112,6 +123,10 @@ impl MapSolver {
             if !self.step(prior, rows, dofs, damping) {
                 damping = next_damping(damping);
                 continue;
+            }
+            if damping == 0.0 {
+                // The system now holds its Cholesky factor.
+                log_determinant = (0..rows).map(|i| 2.0 * self.system[i * rows + i].ln()).sum();
             }
             let (_, trial_data) =
                 likelihood.residuals(kinematics, &self.trial_x, measured, &mut self.trial_residuals);
@@ -137,7 +152,7 @@ impl MapSolver {
         }
         let squares: f64 = self.residuals[..rows].iter().map(|r| r * r).sum();
         let residual_m = if rows > 0 { (squares / (rows / 3) as f64).sqrt() } else { 0.0 };
-        Solution { steps, likelihood_energy: data_energy, prior_energy, residual_m }
+        Solution { steps, likelihood_energy: data_energy, prior_energy, residual_m, log_determinant }
     }
 
     /// `JΣ`, using that most of J is zero: a point is moved by its own chain only.

@@ -207,8 +207,8 @@ impl<'a> Reconstructor<'a> {
     }
 
     /// The best of several beginnings at `frame` (method §2, mend 8): database poses whose control points fit the
-    /// coming frames, each run over these frames, and `current` among them if there is one. The one of least energy
-    /// wins.
+    /// coming frames, each run over these frames, and `current` among them if there is one. The one that makes the
+    /// measurements most probable wins.
     fn start(&self, tracker: &mut Tracker<'_>, frame: usize, current: Option<Track>) -> Result<Track> {
         let trajectories = &self.session.trajectories;
         // Without two measured points there is nothing to fit: look at the first frame that has them.
@@ -233,12 +233,12 @@ impl<'a> Reconstructor<'a> {
         let begun: Vec<Track> = starts.iter().map(|s| tracker.track_from(s)).chain(current).collect();
         for track in begun {
             let mut probe = track.clone();
-            let mut energy = 0.0;
+            let mut surprise = 0.0;
             for f in first..first + ahead {
-                energy += tracker.step(&mut probe, trajectories.frame(f)).energy();
+                surprise += tracker.step(&mut probe, trajectories.frame(f)).solution.surprise();
             }
-            if best.as_ref().is_none_or(|(least, _)| energy < *least) {
-                best = Some((energy, track));
+            if best.as_ref().is_none_or(|(least, _)| surprise < *least) {
+                best = Some((surprise, track));
             }
         }
         best.map(|(_, track)| track).ok_or(Error::NoStart { frame })

@@ -165,6 +165,7 @@ impl<'a> Tracker<'a> {
         let newest = &mut track.history[0];
         newest.copy_from_slice(self.solver.coordinates());
         frame.absolute(newest);
+        self.kinematics.parametrisation().wrap(newest);
         track.matches.clear();
         track.matches.extend(self.neighbours.iter().map(|n| n.row));
         let measured = 3 * self.measured.iter().flatten().count();
