@@ -1,0 +1,197 @@
+use model::Motion;
+
+use crate::chance::{Chance, Purpose};
+use crate::features::{CHANNELS, CONTACT};
+use crate::ground;
+use crate::movement::{Model, Movement};
+use crate::segment::piecewise;
+use crate::signal::{bend_into, smooth, smoothstep};
+use crate::{Action, Error, Result};
+
+/// Frames per second of a drawn motion.
+pub const FRAME_RATE: f64 = 60.0;
+/// Most frames of one drawn motion.
+const MOST_FRAMES: usize = 1 << 20;
+/// Share of the style's variance that a subject keeps from trial to trial.
+const PERSONAL_SHARE: f64 = 0.6;
+/// Styles and variations farther out than this many deviations are not drawn.
+const MOST_DEVIATIONS: f64 = 2.0;
+/// Durations between marks are kept within these, seconds.
+const DURATION_SECS: (f64, f64) = (0.05, 5.0);
+/// Time constant of the smoothing that hides the joints between events, frames.
+const EVENT_SMOOTHING: f64 = 1.2;
+
+/// How much of what is drawn, and of whom.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DrawOptions {
+    /// number of frames, at 60 per second
+    pub frames: usize,
+    /// seed of the person: bone lengths, and what stays the same in all trials of an action
+    pub subject: u64,
+}
+
+impl Default for DrawOptions {
+    /// Four seconds of subject 0.
+    fn default() -> Self {
+        Self { frames: 240, subject: 0 }
+    }
+}
+
+impl Model {
+    /// Draws a trial: a motion at 60 frames per second on [`Model::skeleton`] of the subject, floor at y = 0,
+    /// beginning above the origin. Synthetic: see [`crate::NOTICE`].
+    ///
+    /// The same model, action, seed and options give the same motion, to the bit; values are rounded to 10⁻⁶ m and
+    /// rad so that this holds between platforms whose sines differ in the last bit.
+    ///
+    /// # Errors
+    /// [`Error::ActionNotLearned`] if the model lacks the action, [`Error::TooManyFrames`].
+    pub fn draw(&self, action: Action, seed: u64, options: &DrawOptions) -> Result<Motion> {
+        if options.frames > MOST_FRAMES {
+            return Err(Error::TooManyFrames { found: options.frames, most: MOST_FRAMES });
+        }
+        let movements: Vec<&Movement> = self.movements.iter().filter(|m| m.shape.action == action).collect();
+        let Some(first) = movements.first() else { return Err(Error::ActionNotLearned { action }) };
+        let mut chance = Chance::new(Purpose::Trial, [action as u64, options.subject, seed]);
+        let style = draw_style(first.style.len(), action, options.subject, &mut chance);
+        let mut rows = match first.shape.basis {
+            crate::basis::Basis::Cycle { .. } => cyclic_rows(first, &style, options.frames, &mut chance),
+            crate::basis::Basis::Once { .. } => event_rows(&movements, &style, options.frames, &mut chance),
+        };
+        for row in &mut rows {
+            for (value, &(low, high)) in row[..CONTACT].iter_mut().zip(&first.shape.ranges) {
+                *value = bend_into(*value, low, high);
+            }
+        }
+        ground::walk_on(self, &self.skeleton(options.subject)?, &rows, chance.between(-3.0, 3.0))
+    }
+}
+
+/// Scores of the style components: partly the subject's own, partly this trial's.
+fn draw_style(components: usize, action: Action, subject: u64, trial: &mut Chance) -> Vec<f64> {
+    let mut personal = Chance::new(Purpose::PersonalStyle, [action as u64, subject, 0]);
+    (0..components)
+        .map(|_| {
+            PERSONAL_SHARE.sqrt() * personal.normal_within(MOST_DEVIATIONS)
+                + (1.0 - PERSONAL_SHARE).sqrt() * trial.normal_within(MOST_DEVIATIONS)
+        })
+        .collect()
+}
+
+/// Scores of the variation, from one segment to the next.
+struct Wander {
+    scores: Vec<f64>,
+}
+
+impl Wander {
+    fn new(movement: &Movement, chance: &mut Chance) -> Self {
+        Self { scores: movement.variation.iter().map(|_| chance.normal_within(MOST_DEVIATIONS)).collect() }
+    }
+
+    fn step(&mut self, movement: &Movement, chance: &mut Chance) {
+        for (score, p) in self.scores.iter_mut().zip(&movement.shape.persistence) {
+            *score = p * *score + (1.0 - p * p).sqrt() * chance.normal_within(MOST_DEVIATIONS);
+        }
+    }
+
+    /// The numbers of a segment: mean, style and this much variation.
+    fn numbers(&self, movement: &Movement, style: &[f64]) -> Vec<f64> {
+        let mut numbers = vec![0.0; movement.shape.num_numbers()];
+        movement.mean.add_to(&mut numbers, 1.0);
+        movement.style.iter().zip(style).for_each(|(c, &z)| c.add_to(&mut numbers, z));
+        movement.variation.iter().zip(&self.scores).for_each(|(c, &z)| c.add_to(&mut numbers, z));
+        numbers
+    }
+}
+
+fn duration_secs(log_secs: f64) -> f64 {
+    log_secs.exp().clamp(DURATION_SECS.0, DURATION_SECS.1)
+}
+
+/// The channels of a segment at a phase.
+fn channels_at(movement: &Movement, numbers: &[f64], values: &mut [f64], phase: f64) -> [f64; CHANNELS] {
+    movement.shape.basis.values(phase, values);
+    let coefficients = &numbers[movement.shape.num_durations()..];
+    let mut row = [0.0; CHANNELS];
+    for (channel, c) in row.iter_mut().zip(coefficients.chunks_exact(values.len())) {
+        *channel = c.iter().zip(values.iter()).map(|(c, v)| c * v).sum();
+    }
+    row
+}
+
+/// Cycle after cycle from a random phase; the numbers move smoothly from one cycle's to the next's.
+fn cyclic_rows(movement: &Movement, style: &[f64], frames: usize, chance: &mut Chance) -> Vec<[f64; CHANNELS]> {
+    let mut wander = Wander::new(movement, chance);
+    let mut current = wander.numbers(movement, style);
+    wander.step(movement, chance);
+    let mut next = wander.numbers(movement, style);
+    let mut values = vec![0.0; movement.shape.basis.len()];
+    let mut phase = chance.uniform();
+    let mut rows = Vec::with_capacity(frames);
+    for _ in 0..frames {
+        let share = smoothstep(phase);
+        let blended: Vec<f64> = current.iter().zip(&next).map(|(a, b)| a + share * (b - a)).collect();
+        rows.push(channels_at(movement, &blended, &mut values, phase));
+        phase += 1.0 / (FRAME_RATE * duration_secs(blended[0]));
+        if phase >= 1.0 {
+            phase -= 1.0;
+            wander.step(movement, chance);
+            current = std::mem::replace(&mut next, wander.numbers(movement, style));
+        }
+    }
+    rows
+}
+
+/// Event after event, with pauses in which the end of one turns into the beginning of the next.
+fn event_rows(movements: &[&Movement], style: &[f64], frames: usize, chance: &mut Chance) -> Vec<[f64; CHANNELS]> {
+    let mut wanders: Vec<Wander> = movements.iter().map(|m| Wander::new(m, chance)).collect();
+    let mut rows: Vec<[f64; CHANNELS]> = Vec::with_capacity(frames);
+    while rows.len() < frames {
+        let index = pick(movements, chance);
+        let movement = movements[index];
+        wanders[index].step(movement, chance);
+        let event = event(movement, &wanders[index].numbers(movement, style));
+        let pause_secs = chance.between(movement.shape.pause_secs.0, movement.shape.pause_secs.1);
+        let pause = (pause_secs * FRAME_RATE) as usize;
+        let from = rows.last().copied().unwrap_or(event[0]);
+        for i in 0..pause {
+            let share = smoothstep((i + 1) as f64 / (pause + 1) as f64);
+            rows.push(std::array::from_fn(|c| from[c] + share * (event[0][c] - from[c])));
+        }
+        rows.extend(event);
+    }
+    rows.truncate(frames);
+    for channel in 0..CHANNELS {
+        let smoothed = smooth(&rows.iter().map(|r| r[channel]).collect::<Vec<_>>(), EVENT_SMOOTHING);
+        rows.iter_mut().zip(smoothed).for_each(|(row, v)| row[channel] = v);
+    }
+    rows
+}
+
+/// The frames of one event.
+fn event(movement: &Movement, numbers: &[f64]) -> Vec<[f64; CHANNELS]> {
+    let mut marks_secs = vec![0.0];
+    for (i, log) in numbers[..movement.shape.num_durations()].iter().enumerate() {
+        marks_secs.push(marks_secs[i] + duration_secs(*log));
+    }
+    let total_secs = marks_secs[marks_secs.len() - 1];
+    let mut values = vec![0.0; movement.shape.basis.len()];
+    (0..=(total_secs * FRAME_RATE) as usize)
+        .map(|i| {
+            let phase = piecewise(i as f64 / FRAME_RATE, &marks_secs, &movement.shape.phases);
+            channels_at(movement, numbers, &mut values, phase)
+        })
+        .collect()
+}
+
+/// One of the movements, each as often as its share says.
+fn pick(movements: &[&Movement], chance: &mut Chance) -> usize {
+    let mut left = chance.uniform() * movements.iter().map(|m| m.shape.share).sum::<f64>();
+    for (i, movement) in movements.iter().enumerate() {
+        left -= movement.shape.share;
+        if left < 0.0 {
+            return i;
+        }
+    }
+    movements.len() - 1
+}
