@@ -60,7 +60,7 @@ pub fn stated_frame_rate(bytes: &[u8]) -> Option<f64> {
 /// Reads what comes before the first frame; gives radians per unit of angle and the first frame's line.
 fn header<'a>(lines: &mut Lines<'a>, warnings: &mut Warnings) -> Result<(f64, Line<'a>)> {
     let mut radians = None;
-    while let Some(line) = lines.next() {
+    for line in lines.by_ref() {
         if line.text.is_empty() || line.text[0] == b'#' {
             continue;
         }

@@ -8,11 +8,14 @@ use formats::{
 use model::{Motion, PointTrajectories};
 use proptest::{prelude::*, sample::Index, test_runner::TestRunner};
 
+/// Reads a file and gives the number of values in it.
+type Reader = dyn Fn(&[u8]) -> Result<usize>;
+
 /// A short piece of a recorded file, and what reads it.
 struct Seed {
     name: &'static str,
     bytes: Vec<u8>,
-    read: Box<dyn Fn(&[u8]) -> Result<usize>>,
+    read: Box<Reader>,
 }
 
 fn size_of_motion(motion: &Motion) -> usize {

@@ -160,7 +160,7 @@ impl<'a> Parameter<'a> {
     pub(super) fn counts(self) -> impl Iterator<Item = u64> {
         let is_float = self.kind == 4;
         self.numbers().filter_map(move |value| match value {
-            v if is_float => (v >= 0.0 && v < 1e15).then_some(v as u64),
+            v if is_float => (0.0..1e15).contains(&v).then_some(v as u64),
             // every value of a word fits; negative ones are counts above 32,767
             v => Some(u64::from((v as i16).cast_unsigned())),
         })
