@@ -1,7 +1,9 @@
+use std::f64::consts::TAU;
+
 use model::Motion;
 
 use crate::chance::{Chance, Purpose};
-use crate::features::{CHANNELS, CONTACT};
+use crate::features::{CHANNELS, CONTACT, TILT};
 use crate::ground;
 use crate::movement::{Model, Movement};
 use crate::segment::piecewise;
@@ -20,6 +22,11 @@ const MOST_DEVIATIONS: f64 = 2.0;
 const DURATION_SECS: (f64, f64) = (0.05, 5.0);
 /// Time constant of the smoothing that hides the joints between events, frames.
 const EVENT_SMOOTHING: f64 = 1.2;
+
+/// Fastest change of an angle between events, rad/s.
+const FASTEST_PAUSE: f64 = 3.0;
+/// Deviation of the waves that keep a standing person alive, radians.
+const SWAY_RAD: f64 = 0.006;
 
 /// How much of what is drawn, and of whom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -152,8 +159,8 @@ fn event_rows(movements: &[&Movement], style: &[f64], frames: usize, chance: &mu
         wanders[index].step(movement, chance);
         let event = event(movement, &wanders[index].numbers(movement, style));
         let pause_secs = chance.between(movement.shape.pause_secs.0, movement.shape.pause_secs.1);
-        let pause = (pause_secs * FRAME_RATE) as usize;
         let from = rows.last().copied().unwrap_or(event[0]);
+        let pause = (pause_secs.max(least_pause_secs(&from, &event[0])) * FRAME_RATE) as usize;
         for i in 0..pause {
             let share = smoothstep((i + 1) as f64 / (pause + 1) as f64);
             rows.push(std::array::from_fn(|c| from[c] + share * (event[0][c] - from[c])));
@@ -161,11 +168,32 @@ fn event_rows(movements: &[&Movement], style: &[f64], frames: usize, chance: &mu
         rows.extend(event);
     }
     rows.truncate(frames);
+    sway(&mut rows, chance);
     for channel in 0..CHANNELS {
         let smoothed = smooth(&rows.iter().map(|r| r[channel]).collect::<Vec<_>>(), EVENT_SMOOTHING);
         rows.iter_mut().zip(smoothed).for_each(|(row, v)| row[channel] = v);
     }
     rows
+}
+
+/// Seconds that it takes to get from one stance to another without haste.
+fn least_pause_secs(from: &[f64; CHANNELS], to: &[f64; CHANNELS]) -> f64 {
+    let farthest = (TILT..CONTACT).map(|c| (to[c] - from[c]).abs()).fold(0.0, f64::max);
+    // A smooth step is at its fastest one and a half times as fast as on average.
+    (1.5 * farthest / FASTEST_PAUSE).min(2.0)
+}
+
+/// Nobody stands quite still: slow waves on every angle.
+fn sway(rows: &mut [[f64; CHANNELS]], chance: &mut Chance) {
+    for channel in TILT..CONTACT {
+        for _ in 0..2 {
+            let amplitude = SWAY_RAD * chance.normal_within(MOST_DEVIATIONS);
+            let (hertz, start) = (chance.between(0.15, 0.7), chance.between(0.0, TAU));
+            for (frame, row) in rows.iter_mut().enumerate() {
+                row[channel] += amplitude * (start + TAU * hertz * frame as f64 / FRAME_RATE).sin();
+            }
+        }
+    }
 }
 
 /// The frames of one event.

@@ -9,16 +9,16 @@ const BELIEVED_SECS: std::ops::RangeInclusive<f64> = 0.45..=2.2;
 /// Least reach of the leading foot in a cycle, leg lengths.
 const LEAST_STRIDE: f64 = 0.12;
 
-/// Cycles from one passing of the left foot by the right to the next. Where a trial is too short for one, cycles
-/// are cut from the right foot's passing instead and turned by half a cycle.
+/// Cycles from each passing of the feet to the same passing a stride later, in the order of time: those that begin
+/// with the left foot coming in front, and, turned by half a cycle, those that begin with the right. They overlap by
+/// half: recorded runs are hardly longer than two strides.
 pub(crate) fn cycles(track: &Track) -> Vec<Segment> {
     let stride = smooth(&track.stride, 0.025 * track.frame_rate);
-    let cycles = between_zeros(track, &stride, 0.0);
-    if !cycles.is_empty() {
-        return cycles;
-    }
     let mirrored: Vec<f64> = stride.iter().map(|s| -s).collect();
-    between_zeros(track, &mirrored, 0.5)
+    let mut cycles = between_zeros(track, &stride, 0.0);
+    cycles.extend(between_zeros(track, &mirrored, 0.5));
+    cycles.sort_by(|a, b| a.marks[0].total_cmp(&b.marks[0]));
+    cycles
 }
 
 fn between_zeros(track: &Track, stride: &[f64], first_phase: f64) -> Vec<Segment> {

@@ -18,6 +18,10 @@ const MOST_STYLES: usize = 12;
 const MOST_VARIATIONS: usize = 10;
 const GROUPS_PER_STYLE: usize = 3;
 const SEGMENTS_PER_VARIATION: usize = 4;
+/// Segments this many times farther from their group's mean than the median are no variation of it but something else.
+const OUTLYING: f64 = 2.5;
+/// Where trials hold one segment each, variation within a trial is taken to be this share of the one between them.
+const STYLE_AS_VARIATION: f64 = 0.4;
 /// Long boxing trials are cut into blocks of this length, each a group of its own, seconds.
 const BLOCK_SECS: f64 = 10.0;
 
@@ -217,9 +221,13 @@ fn assemble(parts: &[Part], ranges: &[(f64, f64)]) -> Vec<Movement> {
     std::iter::zip(parts, &centred)
         .map(|(part, centred)| {
             let to = from + centred.mean.len();
-            let style = styles.iter().map(|s| Quantised::new(&s[from..to])).collect();
+            let own: Vec<&[f64]> = styles.iter().map(|s| &s[from..to]).collect();
             from = to;
-            let (variation, persistence) = centred.variation(part);
+            let (mut variation, mut persistence) = centred.variation(part);
+            if variation.is_empty() {
+                variation = own.iter().map(|s| s.iter().map(|v| v * STYLE_AS_VARIATION).collect()).collect();
+                persistence = vec![0.0; variation.len()];
+            }
             Movement {
                 shape: MovementShape {
                     action: part.kind.action,
@@ -234,7 +242,7 @@ fn assemble(parts: &[Part], ranges: &[(f64, f64)]) -> Vec<Movement> {
                     groups: centred.groups.len(),
                 },
                 mean: Quantised::new(&centred.mean),
-                style,
+                style: own.into_iter().map(Quantised::new).collect(),
                 variation: variation.iter().map(|v| Quantised::new(v)).collect(),
             }
         })
@@ -298,16 +306,40 @@ impl Centred {
             follows.push(previous == Some(&o.group));
             previous = Some(&o.group);
         }
-        let total = residuals.len() as f64;
         let importance = part.importance();
+        leave_out_outlying(&mut residuals, &mut votes, &mut follows, &importance);
         let most = MOST_VARIATIONS.min(residuals.len() / SEGMENTS_PER_VARIATION);
         let mut components = principal(&residuals, &votes, &importance, most);
         // `principal` takes votes relative to their sum: put back what the sum exceeds the count by.
-        let inflation = (votes.iter().sum::<f64>() / total.max(1.0)).sqrt();
-        let persistence = components.iter().map(|c| persistence(&residuals, &follows, c, &importance)).collect();
+        let inflation = (votes.iter().sum::<f64>() / (residuals.len() as f64).max(1.0)).sqrt();
+        let steps_per_segment = match part.kind.basis {
+            // Recorded cycles follow each other by half a cycle.
+            Basis::Cycle { .. } => 2,
+            Basis::Once { .. } => 1,
+        };
+        let persistence = components
+            .iter()
+            .map(|c| persistence(&residuals, &follows, c, &importance).powi(steps_per_segment))
+            .collect();
         components.iter_mut().flatten().for_each(|v| *v *= inflation);
         (components, persistence)
     }
+}
+
+fn leave_out_outlying(
+    residuals: &mut Vec<Vec<f64>>,
+    votes: &mut Vec<f64>,
+    follows: &mut Vec<bool>,
+    importance: &[f64],
+) {
+    let size = |r: &Vec<f64>| r.iter().zip(importance).map(|(v, w)| (v * w).powi(2)).sum::<f64>().sqrt();
+    let sizes: Vec<f64> = residuals.iter().map(size).collect();
+    let most = OUTLYING * quantile(&sizes, 0.5);
+    let kept: Vec<usize> = (0..sizes.len()).filter(|&i| sizes[i] <= most).collect();
+    // What follows one that is left out follows nothing.
+    *follows = kept.iter().map(|&i| follows[i] && sizes[i - 1] <= most).collect();
+    *votes = kept.iter().map(|&i| votes[i]).collect();
+    *residuals = kept.into_iter().map(|i| std::mem::take(&mut residuals[i])).collect();
 }
 
 /// Correlation of a component's scores in successive segments, 0 to 0.9.
