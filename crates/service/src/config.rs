@@ -12,6 +12,7 @@
 //! | `MAREY_DATABASE_CACHE_BYTES` | 2 GiB | motion databases kept in memory |
 //! | `MAREY_MAX_OBJECT_BYTES` | 1 GiB | largest object read into memory |
 //! | `MAREY_MAX_INPUT_BYTES` | 8 GiB | unpacked motion files of one motion database |
+//! | `MAREY_MAX_SESSION_FRAMES` | 432000 | frames of one session at 60 a second: two hours |
 //! | `MAREY_LOG` | `info` | filter: `info`, `warn,motion_index=debug`, … |
 //! | `MAREY_LOG_FORMAT` | `pretty` | `pretty` or `json` |
 
@@ -94,6 +95,8 @@ pub struct MemoryConfig {
     pub max_object_bytes: u64,
     /// Unpacked motion files of one motion database, bytes. Default 8 GiB: all of the CMU library is 5.
     pub max_input_bytes: u64,
+    /// Frames of one session at 60 a second. Default 432 000, two hours: putting it together takes about 4 kB a frame.
+    pub max_session_frames: usize,
 }
 
 const GIB: u64 = 1 << 30;
@@ -119,6 +122,7 @@ impl Config {
                 database_cache_bytes: 2 * GIB,
                 max_object_bytes: GIB,
                 max_input_bytes: 8 * GIB,
+                max_session_frames: 2 * 60 * 60 * 60,
             },
         }
     }
@@ -143,6 +147,7 @@ impl Config {
         vars.set("MAREY_DATABASE_CACHE_BYTES", &mut config.memory.database_cache_bytes)?;
         vars.set("MAREY_MAX_OBJECT_BYTES", &mut config.memory.max_object_bytes)?;
         vars.set("MAREY_MAX_INPUT_BYTES", &mut config.memory.max_input_bytes)?;
+        vars.set("MAREY_MAX_SESSION_FRAMES", &mut config.memory.max_session_frames)?;
         Ok(config)
     }
 }

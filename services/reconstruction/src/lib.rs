@@ -1,1 +1,98 @@
 //! The reconstruction service: full-body motion from control points.
+//!
+//! [`start`] runs the gRPC server (`marey.v1.Reconstruction`, health, reflection) and claims three kinds of job:
+//!
+//! ```text
+//! plan-sparse ──► reconstruct-chunk × n ──► merge-chunks
+//! ```
+//!
+//! [`PLAN_SPARSE`] reads what people uploaded and writes one canonical session; nothing after it reads an upload
+//! again, but for the ground truth. How a session is cut depends on its length and parameters alone, so the result does
+//! not depend on how many workers there were or what happened to them.
+
+mod chunk_job;
+mod error;
+mod evaluate;
+mod export;
+mod inputs;
+mod merge_job;
+mod payload;
+mod plan_job;
+mod priors;
+mod rpc;
+mod run_report;
+
+pub use error::InputError;
+pub use payload::{InputFile, MergeChunks, MotionDatabaseFile, Object, PlanSparse, ReconstructChunk};
+
+use priors::Priors;
+use proto::v1::reconstruction_server::ReconstructionServer;
+use service::{Config, Parts, Running};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+use store::Store;
+use tokio_util::sync::CancellationToken;
+use tonic::service::Routes;
+
+/// Reads a session's files and plans its chunks.
+pub const PLAN_SPARSE: &str = "plan-sparse";
+/// Reconstructs one chunk of a session.
+pub const RECONSTRUCT_CHUNK: &str = "reconstruct-chunk";
+/// Puts the chunks together and writes the results.
+pub const MERGE_CHUNKS: &str = "merge-chunks";
+
+/// Name of the service in logs and in the queue.
+pub const NAME: &str = "reconstruction";
+
+/// Where it listens unless told otherwise: this machine only.
+pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 50052);
+
+/// What all handlers of one process share.
+struct Shared {
+    store: Store,
+    pool: sqlx::PgPool,
+    priors: Priors,
+    memory: service::config::MemoryConfig,
+    /// How this process shows in `run.json`.
+    worker_name: String,
+}
+
+/// Starts the service; it runs until `shutdown`. [`Running::address`] says where it listens.
+///
+/// # Errors
+/// If the address, the store or the database's URL can't be used. A database that does not answer yet is
+/// waited for.
+pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Running, service::Error> {
+    let pool = service::database::pool(&config.database)?;
+    let store = Store::open(&config.store)?;
+    let shared = Arc::new(Shared {
+        priors: Priors::new(store.clone(), &config.memory),
+        pool: pool.clone(),
+        store,
+        memory: config.memory.clone(),
+        worker_name: config.worker.name(NAME),
+    });
+    let routes = Routes::new(ReconstructionServer::new(rpc::Rpc::new(shared.clone())));
+    let builder = config.worker.builder(NAME, &pool).map(|builder| {
+        builder
+            .handler(plan_job::PlanHandler::new(shared.clone()))
+            .handler(chunk_job::ChunkHandler::new(shared.clone()))
+            .handler(merge_job::MergeHandler::new(shared))
+    });
+    let parts = Parts {
+        name: NAME,
+        grpc_names: &["marey.v1.Reconstruction"],
+        routes,
+        descriptors: proto::FILE_DESCRIPTOR_SET,
+        worker: builder.map(|b| move |stop| b.start(stop)),
+    };
+    service::start(&config, parts, pool, shutdown).await
+}
+
+/// Runs the service until `shutdown`.
+///
+/// # Errors
+/// As [`start`], and whatever made it stop before.
+pub async fn run(config: Config, shutdown: CancellationToken) -> Result<(), service::Error> {
+    start(config, shutdown).await?.stopped().await
+}

@@ -1,0 +1,76 @@
+//! Why a question can't be answered.
+
+use proto::ErrorCode;
+use uuid::Uuid;
+
+/// An error of a query.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The request makes no sense by itself.
+    #[error(transparent)]
+    Request(#[from] proto::Error),
+    /// There is no such database.
+    #[error("motion database {0} does not exist")]
+    NoSuchDatabase(Uuid),
+    /// The database is not built.
+    #[error("motion database {0} is not ready: its build has not succeeded yet")]
+    NotReady(Uuid),
+    /// The page token is none of ours.
+    #[error("page_token is not one that ListDatabases gave")]
+    PageToken,
+    /// A control point is not on the skeleton, or the skeleton is not what the question needs.
+    #[error(transparent)]
+    Kinematics(#[from] kinematics::Error),
+    /// The poses are no motion.
+    #[error(transparent)]
+    Model(#[from] model::Error),
+    /// The database can't answer this question, or its file is not one.
+    #[error(transparent)]
+    Database(#[from] motion_db::Error),
+    /// The answer needs more memory than there is for it.
+    #[error("{what} needs {needed_bytes} bytes, this service keeps at most {limit_bytes}")]
+    TooLarge {
+        /// What.
+        what: &'static str,
+        /// Bytes it would take.
+        needed_bytes: u64,
+        /// Bytes there are.
+        limit_bytes: u64,
+    },
+    /// The object store failed, or does not hold what the catalogue says.
+    #[error(transparent)]
+    Store(#[from] store::Error),
+    /// PostgreSQL failed.
+    #[error("database: {0}")]
+    Catalogue(#[from] sqlx::Error),
+}
+
+impl Error {
+    /// Which kind of error it is.
+    pub fn code(&self) -> ErrorCode {
+        match self {
+            Self::Request(_) | Self::PageToken | Self::Kinematics(_) | Self::Model(_) => {
+                ErrorCode::InvalidInput
+            }
+            Self::Database(motion_db::Error::Window { .. }) => ErrorCode::InvalidInput,
+            Self::Database(motion_db::Error::Version { .. }) => ErrorCode::NotReady,
+            Self::NoSuchDatabase(_) => ErrorCode::NotFound,
+            Self::NotReady(_) => ErrorCode::NotReady,
+            Self::TooLarge { .. } => ErrorCode::TooLarge,
+            Self::Store(error) if error.is_transient() => ErrorCode::Unavailable,
+            Self::Catalogue(_) => ErrorCode::Unavailable,
+            Self::Database(_) | Self::Store(_) => ErrorCode::Internal,
+        }
+    }
+}
+
+impl From<Error> for tonic::Status {
+    fn from(error: Error) -> Self {
+        let code = error.code();
+        if matches!(code, ErrorCode::Internal | ErrorCode::Unavailable) {
+            tracing::error!(%error, "query failed");
+        }
+        code.status(error)
+    }
+}

@@ -1,0 +1,129 @@
+//! What is wrong with a session's files or with a question.
+
+use proto::ErrorCode;
+use queue::JobError;
+use uuid::Uuid;
+
+/// Something about the input that only its owner can mend. The message is for them.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// A file can't be read.
+    #[error("{file}: {source}")]
+    File {
+        /// Name of the file.
+        file: String,
+        /// Where and what.
+        source: formats::Error,
+    },
+    /// A file is of a kind that its role does not take.
+    #[error("{file}: found a file of another kind, expected {expected} for role {role}")]
+    Kind {
+        /// Name of the file.
+        file: String,
+        /// Its role.
+        role: &'static str,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// A role that must be filled once.
+    #[error("session has {found} files of role {role}{names}, expected {expected}")]
+    Count {
+        /// The role.
+        role: &'static str,
+        /// How many files.
+        found: usize,
+        /// Which, in brackets.
+        names: String,
+        /// How many there should be.
+        expected: &'static str,
+    },
+    /// The mapping names something that is not in the file.
+    #[error("mapping has {name:?}, which is not in {file}; it has {has}")]
+    Mapping {
+        /// Name in the mapping.
+        name: String,
+        /// Name of the file.
+        file: String,
+        /// Names in the file.
+        has: String,
+    },
+    /// Two names of the file are mapped to one.
+    #[error("mapping leads to {name:?} more than once in {file}")]
+    MappedTwice {
+        /// The name.
+        name: String,
+        /// Name of the file.
+        file: String,
+    },
+    /// The session is longer than this service takes.
+    #[error(
+        "session has {frames} frames at 60 frames a second, expected at most {limit}; cut it and upload the parts"
+    )]
+    TooLong {
+        /// Number of frames.
+        frames: usize,
+        /// Most frames.
+        limit: usize,
+    },
+    /// The skeleton, the points or the trajectories don't fit each other or the method.
+    #[error(transparent)]
+    Sparse(#[from] sparse::Error),
+    /// A name stands for no point of the skeleton.
+    #[error(transparent)]
+    Points(#[from] kinematics::Error),
+}
+
+impl From<InputError> for JobError {
+    fn from(error: InputError) -> Self {
+        // A run that was stopped is not one with bad input.
+        match error {
+            InputError::Sparse(sparse::Error::Stopped { .. }) => Self::Stopped,
+            error => Self::give_up(error.to_string(), format!("{error:?}")),
+        }
+    }
+}
+
+/// Why a gRPC call can't be answered.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CallError {
+    #[error(transparent)]
+    Request(#[from] proto::Error),
+    #[error(transparent)]
+    Input(#[from] InputError),
+    #[error("motion database {0} does not exist or is not ready")]
+    NoSuchDatabase(Uuid),
+    #[error("the motion database can't be loaded")]
+    Prior(#[source] JobError),
+    #[error("database: {0}")]
+    Catalogue(#[from] sqlx::Error),
+}
+
+impl CallError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::Input(InputError::Sparse(sparse::Error::Stopped { .. })) => ErrorCode::Cancelled,
+            Self::Input(InputError::TooLong { .. }) => ErrorCode::TooLarge,
+            Self::Request(_) | Self::Input(_) => ErrorCode::InvalidInput,
+            Self::NoSuchDatabase(_) => ErrorCode::NotFound,
+            Self::Prior(JobError::GiveUp { .. }) => ErrorCode::NotReady,
+            Self::Prior(_) | Self::Catalogue(_) => ErrorCode::Unavailable,
+        }
+    }
+}
+
+impl From<sparse::Error> for CallError {
+    fn from(error: sparse::Error) -> Self {
+        Self::Input(error.into())
+    }
+}
+
+impl From<CallError> for tonic::Status {
+    fn from(error: CallError) -> Self {
+        let code = error.code();
+        if matches!(code, ErrorCode::Unavailable | ErrorCode::NotReady) {
+            tracing::error!(error = ?error, "call failed");
+        }
+        code.status(error)
+    }
+}

@@ -1,0 +1,123 @@
+//! The files that people get.
+
+use kinematics::{Kinematics, Parametrisation};
+use model::Motion;
+use sparse::{FrameQuality, Merged};
+use std::fmt::Write as _;
+
+/// A result's name, its media type, and how it is written.
+pub(crate) struct Export {
+    /// Name of the file.
+    pub name: &'static str,
+    /// Its media type.
+    pub media_type: &'static str,
+    /// Makes the content.
+    pub write: fn(&Merged) -> String,
+}
+
+const TEXT: &str = "text/plain; charset=utf-8";
+const CSV: &str = "text/csv; charset=utf-8";
+
+/// All of them, made one after the other so that only one is in memory at a time.
+pub(crate) const EXPORTS: [Export; 6] = [
+    Export { name: "motion.bvh", media_type: TEXT, write: |m| formats::bvh::write(&m.motion) },
+    Export { name: "motion.amc", media_type: TEXT, write: |m| formats::amc::write(&m.motion) },
+    Export { name: "skeleton.asf", media_type: TEXT, write: |m| formats::asf::write(m.motion.skeleton()) },
+    Export { name: "poses.csv", media_type: CSV, write: |m| formats::motion_csv::write(&m.motion) },
+    Export { name: "positions.csv", media_type: CSV, write: |m| positions(&m.motion) },
+    Export { name: "quality.csv", media_type: CSV, write: |m| quality(&m.quality, m.motion.frame_rate()) },
+];
+
+/// Positions of all joints: `frame,time,root_x,root_y,root_z,…`; seconds and metres, y up.
+fn positions(motion: &Motion) -> String {
+    let skeleton = motion.skeleton();
+    let mut out = String::from("frame,time");
+    for joint in skeleton.joints() {
+        let name = quoted(&joint.name);
+        let _ = write!(out, ",{}", name.replace('\u{0}', "_x"));
+        let _ = write!(out, ",{}", name.replace('\u{0}', "_y"));
+        let _ = write!(out, ",{}", name.replace('\u{0}', "_z"));
+    }
+    out.push('\n');
+    let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
+    let mut state = kinematics.state();
+    for (frame, pose) in motion.poses().enumerate() {
+        kinematics.update(pose, &mut state);
+        let _ = write!(out, "{frame},{:.6}", frame as f64 / motion.frame_rate());
+        for p in &state.positions {
+            let _ = write!(out, ",{:.7},{:.7},{:.7}", p.x, p.y, p.z);
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// A joint's name as a cell with a place (NUL) for the suffix; quoted if it must be.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\u{0}\"", name.replace('"', "\"\""))
+    } else {
+        format!("{name}\u{0}")
+    }
+}
+
+/// How well each frame is known.
+fn quality(quality: &[FrameQuality], frame_rate: f64) -> String {
+    let mut out =
+        String::from("frame,time,measured_points,residual_m,sigma_rad,energy,neighbour_distance_deg\n");
+    for (frame, q) in quality.iter().enumerate() {
+        let _ = writeln!(
+            out,
+            "{frame},{:.6},{},{:.7},{:.7},{:.6},{:.6}",
+            frame as f64 / frame_rate,
+            q.measured_points,
+            q.residual_m,
+            q.sigma_rad,
+            q.energy,
+            q.neighbour_distance_deg
+        );
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model::{Axis, Channel, Joint, Skeleton};
+
+    fn motion(name: &str) -> Motion {
+        let root = Joint::root(name, vec![Channel::translation(Axis::X), Channel::rotation(Axis::X)]);
+        let skeleton = Skeleton::new("s", vec![root]).unwrap();
+        Motion::new(skeleton.into(), 60.0, vec![0.5, 0.0, 1.0, 0.0]).unwrap()
+    }
+
+    #[test]
+    fn positions_have_a_row_a_frame() {
+        let text = positions(&motion("root"));
+        assert_eq!(
+            text,
+            "frame,time,root_x,root_y,root_z\n\
+             0,0.000000,0.5000000,0.0000000,0.0000000\n\
+             1,0.016667,1.0000000,0.0000000,0.0000000\n"
+        );
+    }
+
+    #[test]
+    fn a_joint_with_a_comma_in_its_name_stays_one_column() {
+        let text = positions(&motion("a,b"));
+        assert!(text.starts_with("frame,time,\"a,b_x\",\"a,b_y\",\"a,b_z\"\n"), "{text}");
+    }
+
+    #[test]
+    fn quality_has_a_row_a_frame() {
+        let q = FrameQuality {
+            residual_m: 0.001,
+            sigma_rad: 0.05,
+            energy: 1.5,
+            neighbour_distance_deg: 2.0,
+            measured_points: 6,
+        };
+        let text = quality(&[q], 60.0);
+        assert_eq!(text.lines().nth(1), Some("0,0.000000,6,0.0010000,0.0500000,1.500000,2.000000"));
+    }
+}

@@ -1,0 +1,239 @@
+//! From a session's files to evidence: skeleton, control points, and the truth if it is known.
+
+use crate::error::InputError;
+use bytes::Bytes;
+use formats::{BvhOptions, PointsOptions, Read, archive, asf, points_csv};
+use model::{Motion, PointTrajectories, Skeleton};
+use sparse::{Session, control_points};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
+
+/// Frame rate of an AMC (which does not say it) when nothing else fits: CMU's, Hz.
+const AMC_FRAME_RATE: f64 = 120.0;
+
+/// A file's content.
+#[derive(Debug, Clone)]
+pub(crate) struct NamedBytes {
+    /// Name given by the user.
+    pub name: String,
+    /// `skeleton`, `control-points` or `ground-truth`; others are not looked at.
+    pub role: String,
+    /// The content.
+    pub bytes: Bytes,
+}
+
+impl NamedBytes {
+    /// The same file, unpacked if its name says that it is compressed.
+    ///
+    /// # Errors
+    /// If it can't be unpacked, to at most `max_bytes`, or is an archive of several files.
+    pub fn unpacked(self, max_bytes: u64) -> Result<Self, InputError> {
+        let lower = self.name.to_ascii_lowercase();
+        if !lower.ends_with(".zst") && !lower.ends_with(".gz") {
+            return Ok(self);
+        }
+        let limits = archive::Limits { total_bytes: max_bytes, entries: 1, ..archive::Limits::default() };
+        let unpacked = archive::entries(&self.name, &self.bytes, &limits);
+        let mut unpacked = unpacked.map_err(|source| InputError::File { file: self.name.clone(), source })?;
+        let bytes = unpacked.pop().map(|entry| Bytes::from(entry.bytes)).unwrap_or_default();
+        Ok(Self { bytes, ..self })
+    }
+}
+
+/// Which trajectories of a file are the control points.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Selection<'a> {
+    /// Names of control points or joints; empty: those of `mapping`, or else all of the file.
+    pub points: &'a [String],
+    /// Name in the file → name of a control point or joint.
+    pub mapping: &'a BTreeMap<String, String>,
+}
+
+/// What a session's files say.
+#[derive(Debug)]
+pub(crate) struct Evidence {
+    /// Skeleton, points and trajectories at 60 frames a second.
+    pub session: Session,
+    /// What was sloppy, each with the file's name.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a session's files. `fallback`: the skeleton when none of them is one.
+///
+/// # Errors
+/// Whatever is wrong, with the file's name and the place in it.
+pub(crate) fn read(
+    files: &[NamedBytes],
+    selection: &Selection<'_>,
+    fallback: &Arc<Skeleton>,
+) -> Result<Evidence, InputError> {
+    let mut warnings = Vec::new();
+    let skeleton = match at_most_one(files, "skeleton")? {
+        Some(file) => read_skeleton(file, &mut warnings)?.skeleton,
+        None => {
+            warnings.push("no skeleton file: the motion database's own skeleton is used".to_owned());
+            fallback.clone()
+        }
+    };
+    let file = at_most_one(files, "control-points")?.ok_or_else(|| InputError::Count {
+        role: "control-points",
+        found: 0,
+        names: String::new(),
+        expected: "one (CSV, TRC or C3D)",
+    })?;
+    let trajectories = read_points(file, &mut warnings)?;
+    let trajectories = rename(trajectories, selection.mapping, &file.name)?;
+    let names = selected(&trajectories, selection);
+    let points = control_points(&skeleton, &names)?;
+    let session = Session::new(skeleton, points, &trajectories)?;
+    if let Some(truth) = ground_truth(files, fallback, session.num_frames() as f64 / 60.0)? {
+        warnings.extend(truth.warnings.iter().map(|w| w.to_string()));
+        if !truth.value.skeleton().same_structure(&session.skeleton) {
+            warnings.push(
+                "the ground truth has another skeleton than the session: it is not compared".to_owned(),
+            );
+        }
+    }
+    Ok(Evidence { session, warnings })
+}
+
+/// The motion that really was, if a file has it; `seconds`: how long the session is, from which the frame rate of an AMC
+/// is guessed.
+///
+/// # Errors
+/// If the file can't be read.
+pub(crate) fn ground_truth(
+    files: &[NamedBytes],
+    fallback: &Arc<Skeleton>,
+    seconds: f64,
+) -> Result<Option<Read<Motion>>, InputError> {
+    let Some(file) = at_most_one(files, "ground-truth")? else { return Ok(None) };
+    let in_file = |source| InputError::File { file: file.name.clone(), source };
+    let read = match kind(&file.name).as_str() {
+        "bvh" => formats::bvh::read(&file.bytes, &BvhOptions::default()).map_err(in_file)?,
+        "amc" => {
+            let acclaim = match at_most_one(files, "skeleton")?.filter(|f| kind(&f.name) == "asf") {
+                Some(skeleton) => read_skeleton(skeleton, &mut Vec::new())?,
+                None => asf::File { skeleton: fallback.clone(), metres_per_unit: asf::CMU_METRES_PER_UNIT },
+            };
+            let read = formats::amc::read(&file.bytes, &acclaim, AMC_FRAME_RATE).map_err(in_file)?;
+            let rate = amc_frame_rate(read.value.num_frames(), seconds);
+            let motion = Motion::new(acclaim.skeleton, rate, read.value.values().to_vec())
+                .map_err(|e| in_file(e.into()))?;
+            Read { value: motion, warnings: read.warnings }
+        }
+        _ => return Err(kind_error(file, "ground-truth", "an AMC or BVH file")),
+    };
+    Ok(Some(read))
+}
+
+/// The usual rate under which so many frames take nearest to `seconds`, Hz; CMU's 120 where none comes near.
+fn amc_frame_rate(frames: usize, seconds: f64) -> f64 {
+    let off = |rate: &f64| (frames as f64 / rate / seconds.max(1e-9)).ln().abs();
+    let best = [120.0, 60.0, 30.0, 240.0, 100.0].into_iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    best.filter(|rate| off(rate) < 0.05).unwrap_or(AMC_FRAME_RATE)
+}
+
+fn read_skeleton(file: &NamedBytes, warnings: &mut Vec<String>) -> Result<asf::File, InputError> {
+    let in_file = |source| InputError::File { file: file.name.clone(), source };
+    match kind(&file.name).as_str() {
+        "asf" => Ok(note(asf::read(&file.bytes).map_err(in_file)?, file, warnings)),
+        "bvh" => {
+            let motion = formats::bvh::read(&file.bytes, &BvhOptions::default()).map_err(in_file)?;
+            let skeleton = note(motion, file, warnings).skeleton().clone();
+            Ok(asf::File { skeleton, metres_per_unit: asf::CMU_METRES_PER_UNIT })
+        }
+        _ => Err(kind_error(file, "skeleton", "an ASF or BVH file")),
+    }
+}
+
+fn read_points(file: &NamedBytes, warnings: &mut Vec<String>) -> Result<PointTrajectories, InputError> {
+    let in_file = |source| InputError::File { file: file.name.clone(), source };
+    let read = match kind(&file.name).as_str() {
+        "csv" => points_csv::read(&file.bytes),
+        "trc" => formats::trc::read(&file.bytes, &PointsOptions::default()),
+        "c3d" => formats::c3d::read(&file.bytes, &PointsOptions::default()),
+        _ => return Err(kind_error(file, "control-points", "a CSV, TRC or C3D file")),
+    };
+    Ok(note(read.map_err(in_file)?, file, warnings))
+}
+
+fn note<T>(read: Read<T>, file: &NamedBytes, warnings: &mut Vec<String>) -> T {
+    warnings.extend(read.warnings.iter().map(|w| format!("{}: {w}", file.name)));
+    read.value
+}
+
+/// The same trajectories under the names that the mapping gives them.
+fn rename(
+    trajectories: PointTrajectories,
+    mapping: &BTreeMap<String, String>,
+    file: &str,
+) -> Result<PointTrajectories, InputError> {
+    if let Some(name) = mapping.keys().find(|name| trajectories.point_index(name).is_none()) {
+        let has = trajectories.names().join(", ");
+        return Err(InputError::Mapping { name: name.clone(), file: file.to_owned(), has });
+    }
+    let renamed = |name: &String| mapping.get(name).unwrap_or(name).clone();
+    let names: Vec<String> = trajectories.names().iter().map(renamed).collect();
+    let mut seen = BTreeSet::new();
+    if let Some(name) = names.iter().find(|name| !seen.insert(*name)) {
+        return Err(InputError::MappedTwice { name: name.clone(), file: file.to_owned() });
+    }
+    let positions = (0..trajectories.num_frames()).flat_map(|f| trajectories.frame(f)).copied().collect();
+    let renamed = PointTrajectories::new(names, trajectories.frame_rate(), positions);
+    Ok(renamed.map_err(sparse::Error::from)?)
+}
+
+/// Names of the control points, in the order asked for or else of the file.
+fn selected(trajectories: &PointTrajectories, selection: &Selection<'_>) -> Vec<String> {
+    if !selection.points.is_empty() {
+        return selection.points.to_vec();
+    }
+    let is_mapped =
+        |name: &&String| selection.mapping.is_empty() || selection.mapping.values().any(|v| v == *name);
+    trajectories.names().iter().filter(is_mapped).cloned().collect()
+}
+
+fn at_most_one<'a>(
+    files: &'a [NamedBytes],
+    role: &'static str,
+) -> Result<Option<&'a NamedBytes>, InputError> {
+    let of_role: Vec<&NamedBytes> = files.iter().filter(|f| f.role == role).collect();
+    if of_role.len() > 1 {
+        let names = of_role.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
+        let names = format!(" ({names})");
+        return Err(InputError::Count { role, found: of_role.len(), names, expected: "one" });
+    }
+    Ok(of_role.first().copied())
+}
+
+fn kind_error(file: &NamedBytes, role: &'static str, expected: &'static str) -> InputError {
+    InputError::Kind { file: file.name.clone(), role, expected }
+}
+
+/// Extension in lower case, without a compression's behind it.
+fn kind(name: &str) -> String {
+    let lower = name.to_ascii_lowercase();
+    let inner = lower.strip_suffix(".zst").or(lower.strip_suffix(".gz")).unwrap_or(&lower);
+    inner.rsplit_once('.').map_or(String::new(), |(_, extension)| extension.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_of_an_amc_is_that_which_makes_it_as_long_as_the_session() {
+        assert_eq!(amc_frame_rate(1200, 10.0), 120.0);
+        assert_eq!(amc_frame_rate(601, 10.0), 60.0);
+        assert_eq!(amc_frame_rate(5, 10.0), 120.0);
+    }
+
+    #[test]
+    fn kinds_are_extensions_without_compression() {
+        assert_eq!(kind("16_15.AMC.zst"), "amc");
+        assert_eq!(kind("points"), "");
+    }
+}

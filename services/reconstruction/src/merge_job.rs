@@ -1,0 +1,141 @@
+//! The job that puts the chunks together and writes the results.
+
+use crate::{
+    MERGE_CHUNKS, Shared, chunk_job,
+    error::InputError,
+    evaluate,
+    export::EXPORTS,
+    payload::{JobReport, MergeChunks},
+    plan_job,
+    run_report::{RUN, RunReport},
+};
+use bytes::Bytes;
+use queue::{Artefact, Handler, JobContext, JobError, Outcome};
+use service::{compute, objects};
+use sparse::{Merged, Reconstruction, Session};
+use std::{sync::Arc, time::Instant};
+use store::Store;
+
+pub(crate) struct MergeHandler {
+    shared: Arc<Shared>,
+}
+
+impl MergeHandler {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+}
+
+impl Handler for MergeHandler {
+    fn kind(&self) -> &'static str {
+        MERGE_CHUNKS
+    }
+
+    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+        let started = Instant::now();
+        let Shared { store, worker_name, .. } = &*self.shared;
+        objects::clean_up_earlier_attempts(store, &job).await;
+        let payload: MergeChunks = job.payload()?;
+        job.progress(0.0, "putting the parts together");
+        let (merged, chunks) = self.merge(&job, &payload).await?;
+        let mut results = self.export(&job, &merged).await?;
+        job.progress(0.9, "comparing with the ground truth");
+        results.extend(self.evaluate(&job, &payload, &merged).await?);
+        let merge = JobReport {
+            worker: worker_name.clone(),
+            attempt: job.attempt(),
+            seconds: started.elapsed().as_secs_f64(),
+            frames: merged.quality.len(),
+        };
+        let report = RunReport::new(job.run_id().0, &payload, &merged.quality, &chunks, &merge);
+        let report = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
+        results.push(objects::write_result(store, &job, RUN, "application/json", report).await?);
+        Ok(results.into_iter().fold(Outcome::default(), Outcome::artefact))
+    }
+}
+
+impl MergeHandler {
+    /// The whole motion, and who made its parts.
+    async fn merge(
+        &self,
+        job: &JobContext,
+        payload: &MergeChunks,
+    ) -> Result<(Arc<Merged>, Vec<JobReport>), JobError> {
+        let Shared { store, pool, priors, memory, .. } = &*self.shared;
+        let limit = memory.max_object_bytes;
+        let mut connection = pool.acquire().await?;
+        let artefacts = queue::dependency_artefacts(&mut connection, job.id()).await?;
+        drop(connection);
+        let (mut parts, mut reports) = (Vec::new(), Vec::new());
+        for artefact in artefacts.iter().map(|a| &a.artefact) {
+            let read = read_artefact(store, artefact, limit);
+            match artefact.name.as_str() {
+                chunk_job::CHUNK => parts.push(read.await?),
+                chunk_job::REPORT => {
+                    reports.push(serde_json::from_slice(&read.await?).map_err(JobError::retry)?)
+                }
+                _ => {}
+            }
+            job.check()?;
+        }
+        let session = objects::Input {
+            name: "the session's artefact",
+            store_key: &payload.session.store_key,
+            blake3: &payload.session.blake3,
+        };
+        let session = objects::read(store, session, limit).await?;
+        let database = priors.database(&payload.request.motion_database).await?;
+        let parameters = payload.request.parameters.clone();
+        let merged = compute::run(move || -> Result<Merged, InputError> {
+            let session = Session::from_bytes(&session)?;
+            let parts: Result<Vec<_>, _> =
+                parts.iter().map(|part| Reconstruction::from_bytes(part)).collect();
+            Ok(sparse::merge(&database, &session, &parameters, &parts?)?)
+        });
+        Ok((Arc::new(merged.await?), reports))
+    }
+
+    /// Writes the motion in every format.
+    async fn export(&self, job: &JobContext, merged: &Arc<Merged>) -> Result<Vec<Artefact>, JobError> {
+        let mut results = Vec::new();
+        for (done, export) in EXPORTS.iter().enumerate() {
+            job.check()?;
+            job.progress(0.3 + 0.6 * done as f64 / EXPORTS.len() as f64, format!("writing {}", export.name));
+            let merged = merged.clone();
+            let content = compute::run(move || (export.write)(&merged)).await;
+            results.push(
+                objects::write_result(&self.shared.store, job, export.name, export.media_type, content)
+                    .await?,
+            );
+        }
+        Ok(results)
+    }
+
+    /// The errors against the ground truth, if there is one.
+    async fn evaluate(
+        &self,
+        job: &JobContext,
+        payload: &MergeChunks,
+        merged: &Arc<Merged>,
+    ) -> Result<Option<Artefact>, JobError> {
+        let Shared { store, priors, memory, .. } = &*self.shared;
+        let files = &payload.request.files;
+        if !files.iter().any(|f| f.role == "ground-truth") {
+            return Ok(None);
+        }
+        let wanted: Vec<_> = files.iter().filter(|f| f.role != "control-points").cloned().collect();
+        let fetched = plan_job::fetch(store, &wanted, memory.max_object_bytes).await?;
+        let database = priors.database(&payload.request.motion_database).await?;
+        let merged = merged.clone();
+        let errors = compute::run(move || evaluate::errors(&fetched, &database, &merged.motion)).await?;
+        let Some(errors) = errors else { return Ok(None) };
+        let json = serde_json::to_vec_pretty(&errors).map_err(JobError::retry)?;
+        Ok(Some(objects::write_result(store, job, evaluate::EVALUATION, "application/json", json).await?))
+    }
+}
+
+async fn read_artefact(store: &Store, artefact: &Artefact, limit: u64) -> Result<Bytes, JobError> {
+    let input =
+        objects::Input { name: &artefact.name, store_key: &artefact.store_key, blake3: &artefact.blake3 };
+    objects::read(store, input, limit).await
+}

@@ -1,0 +1,114 @@
+//! What the jobs of this service are given. Everything that decides the result is in here.
+
+use serde::{Deserialize, Serialize};
+use sparse::Parameters;
+use std::collections::BTreeMap;
+use uuid::Uuid;
+
+/// Payload of [`crate::PLAN_SPARSE`], made by the gateway.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlanSparse {
+    /// The session.
+    pub session_id: Uuid,
+    /// Its name.
+    #[serde(default)]
+    pub session_name: String,
+    /// The database that serves as prior.
+    pub motion_database: MotionDatabaseFile,
+    /// The session's files, in order of name.
+    pub files: Vec<InputFile>,
+    /// Control points to use; empty: those of `mapping`, or else all that the file has.
+    #[serde(default)]
+    pub points: Vec<String>,
+    /// Name in the file → name of a control point or joint.
+    #[serde(default)]
+    pub mapping: BTreeMap<String, String>,
+    /// All resolved.
+    pub parameters: Parameters,
+}
+
+/// An uploaded file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InputFile {
+    /// Name given by the user.
+    pub name: String,
+    /// `skeleton`, `control-points` or `ground-truth`.
+    pub role: String,
+    /// Where it is in the object store.
+    pub store_key: String,
+    /// Size, bytes.
+    pub bytes: u64,
+    /// BLAKE3 of the content, hex.
+    pub blake3: String,
+}
+
+/// A motion database that is ready.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct MotionDatabaseFile {
+    /// The row in `motion_databases`.
+    pub id: Uuid,
+    /// Name in its project.
+    pub name: String,
+    /// Version of that name, from 1.
+    pub version: i32,
+    /// Where its index file is in the object store.
+    pub store_key: String,
+    /// BLAKE3 of the index file, hex.
+    pub blake3: String,
+}
+
+/// An artefact of an earlier job.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Object {
+    /// Where it is in the object store.
+    pub store_key: String,
+    /// BLAKE3 of the content, hex.
+    pub blake3: String,
+}
+
+/// Payload of [`crate::RECONSTRUCT_CHUNK`], made by the plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReconstructChunk {
+    /// The canonical session.
+    pub session: Object,
+    /// The database that serves as prior.
+    pub motion_database: MotionDatabaseFile,
+    /// All resolved.
+    pub parameters: Parameters,
+    /// Which chunk, from 0.
+    pub chunk: usize,
+    /// How many there are.
+    pub num_chunks: usize,
+    /// First frame to compute, at 60 frames a second.
+    pub start: usize,
+    /// One past the last frame to compute.
+    pub end: usize,
+}
+
+/// Payload of [`crate::MERGE_CHUNKS`], made by the plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MergeChunks {
+    /// What the plan was given.
+    pub request: PlanSparse,
+    /// The canonical session.
+    pub session: Object,
+    /// The control points that are used.
+    pub points: Vec<String>,
+    /// What was sloppy about the files.
+    pub warnings: Vec<String>,
+    /// What the plan itself took.
+    pub plan: JobReport,
+}
+
+/// Who did a job, and how long it took. Goes to `run.json`, never into a motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JobReport {
+    /// The worker process.
+    pub worker: String,
+    /// Which attempt it was, from 1.
+    pub attempt: i32,
+    /// Time it took, seconds.
+    pub seconds: f64,
+    /// Frames that it computed.
+    pub frames: usize,
+}

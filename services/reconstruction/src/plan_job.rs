@@ -1,0 +1,123 @@
+//! The job that reads a session's files and plans the rest of the run.
+
+use crate::{
+    MERGE_CHUNKS, PLAN_SPARSE, RECONSTRUCT_CHUNK, Shared,
+    error::InputError,
+    inputs::{self, Evidence, NamedBytes},
+    payload::{InputFile, JobReport, MergeChunks, Object, PlanSparse, ReconstructChunk},
+};
+use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
+use service::{compute, objects};
+use sparse::{Reconstructor, plan_chunks};
+use std::{sync::Arc, time::Instant};
+use store::Store;
+
+/// Attempts of a chunk: more than usual, as one may be lost with each worker that is taken away.
+const CHUNK_ATTEMPTS: i32 = 5;
+/// Weight of jobs in the run's progress: frames for a weight of 1.
+const FRAMES_PER_WEIGHT: f64 = 60.0;
+/// Frames that the merge gets through in the time of one reconstructed frame.
+const MERGE_SPEED: f64 = 20.0;
+
+pub(crate) struct PlanHandler {
+    shared: Arc<Shared>,
+}
+
+impl PlanHandler {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+}
+
+impl Handler for PlanHandler {
+    fn kind(&self) -> &'static str {
+        PLAN_SPARSE
+    }
+
+    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+        let started = Instant::now();
+        let Shared { store, priors, memory, worker_name, .. } = &*self.shared;
+        objects::clean_up_earlier_attempts(store, &job).await;
+        let request: PlanSparse = job.payload()?;
+        request.parameters.check().map_err(InputError::from)?;
+        job.progress(0.1, "reading the session's files");
+        let files = fetch(store, &request.files, memory.max_object_bytes).await?;
+        let prior = priors.get(&request.motion_database, request.parameters.window).await?;
+        job.check()?;
+
+        let (limit, asked) = (memory.max_session_frames, request.clone());
+        let (evidence, bytes) = compute::run(move || -> Result<(Evidence, Vec<u8>), InputError> {
+            let selection = inputs::Selection { points: &asked.points, mapping: &asked.mapping };
+            let evidence = inputs::read(&files, &selection, prior.database.skeleton())?;
+            let frames = evidence.session.num_frames();
+            if frames > limit {
+                return Err(InputError::TooLong { frames, limit });
+            }
+            // What does not fit the database is said now, not by every chunk.
+            Reconstructor::new(&prior.database, &prior.index, &evidence.session, &asked.parameters)?;
+            let bytes = evidence.session.to_bytes();
+            Ok((evidence, bytes))
+        })
+        .await?;
+        job.check()?;
+        job.progress(0.9, "planning");
+        let artefact = objects::write(store, &job, "session.bin", "application/octet-stream", bytes).await?;
+        let session = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
+        let report = JobReport {
+            worker: worker_name.clone(),
+            attempt: job.attempt(),
+            seconds: started.elapsed().as_secs_f64(),
+            frames: evidence.session.num_frames(),
+        };
+        Ok(Outcome::default().artefact(artefact).children(children(request, session, evidence, report)?))
+    }
+}
+
+/// Reads files, unpacked where they are compressed.
+pub(crate) async fn fetch(
+    store: &Store,
+    files: &[InputFile],
+    max_bytes: u64,
+) -> Result<Vec<NamedBytes>, JobError> {
+    let mut found = Vec::new();
+    for file in files {
+        let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
+        let bytes = objects::read(store, input, max_bytes).await?;
+        let file = NamedBytes { name: file.name.clone(), role: file.role.clone(), bytes };
+        found.push(compute::run(move || file.unpacked(max_bytes)).await?);
+    }
+    Ok(found)
+}
+
+/// The chunk jobs, and the merge that waits for all of them.
+fn children(
+    request: PlanSparse,
+    session: Object,
+    evidence: Evidence,
+    plan: JobReport,
+) -> Result<Vec<ChildJob>, JobError> {
+    let num_frames = evidence.session.num_frames();
+    let chunks = plan_chunks(num_frames, &request.parameters);
+    let num_chunks = chunks.len();
+    let mut jobs = Vec::with_capacity(num_chunks + 1);
+    for chunk in chunks {
+        let payload = ReconstructChunk {
+            session: session.clone(),
+            motion_database: request.motion_database.clone(),
+            parameters: request.parameters.clone(),
+            chunk: chunk.index,
+            num_chunks,
+            start: chunk.frames.start,
+            end: chunk.frames.end,
+        };
+        let payload = serde_json::to_value(payload).map_err(JobError::retry)?;
+        let weight = chunk.frames.len() as f64 / FRAMES_PER_WEIGHT;
+        jobs.push(ChildJob::new(RECONSTRUCT_CHUNK, payload).weight(weight).max_attempts(CHUNK_ATTEMPTS));
+    }
+    let points = evidence.session.points.iter().map(|p| p.name.clone()).collect();
+    let merge = MergeChunks { request, session, points, warnings: evidence.warnings, plan };
+    let merge = serde_json::to_value(merge).map_err(JobError::retry)?;
+    let weight = num_frames as f64 / FRAMES_PER_WEIGHT / MERGE_SPEED;
+    jobs.push(ChildJob::new(MERGE_CHUNKS, merge).weight(weight).depends_on(0..num_chunks));
+    Ok(jobs)
+}

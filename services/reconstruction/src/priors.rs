@@ -1,0 +1,90 @@
+//! Motion databases as priors, kept in memory up to a bound and shared by jobs and calls.
+
+use crate::payload::MotionDatabaseFile;
+use motion_db::{MotionDatabase, WindowIndex};
+use queue::JobError;
+use service::{Cache, compute, config::MemoryConfig, objects};
+use std::sync::Arc;
+use store::Store;
+
+/// Share of the bound that goes to databases; the rest is for indexes, which are as many times larger as their
+/// windows are long.
+const DATABASE_SHARE: f64 = 0.25;
+
+/// A database and its index of windows.
+#[derive(Debug, Clone)]
+pub(crate) struct Prior {
+    pub database: Arc<MotionDatabase>,
+    pub index: Arc<WindowIndex>,
+}
+
+pub(crate) struct Priors {
+    store: Store,
+    /// by checksum: a database never changes
+    databases: Cache<String, MotionDatabase>,
+    /// by checksum and length of the windows, frames
+    indexes: Cache<(String, usize), WindowIndex>,
+}
+
+impl Priors {
+    pub fn new(store: Store, memory: &MemoryConfig) -> Self {
+        let databases = (memory.database_cache_bytes as f64 * DATABASE_SHARE) as u64;
+        Self {
+            store,
+            databases: Cache::new(databases),
+            indexes: Cache::new(memory.database_cache_bytes - databases),
+        }
+    }
+
+    /// The database itself.
+    ///
+    /// # Errors
+    /// Gives up if the file is gone, not a database, or too large for this service.
+    pub async fn database(&self, file: &MotionDatabaseFile) -> Result<Arc<MotionDatabase>, JobError> {
+        let name = format!("motion database {} version {}", file.name, file.version);
+        let load = async {
+            let input = objects::Input { name: &name, store_key: &file.store_key, blake3: &file.blake3 };
+            let bytes = objects::read(&self.store, input, self.databases.capacity_bytes()).await?;
+            let database = compute::run(move || MotionDatabase::from_bytes(&bytes))
+                .await
+                .map_err(|e| JobError::give_up(format!("{name} can't be used: {e}"), format!("{e:?}")))?;
+            let bytes = (database.num_poses() * database.num_dofs() * size_of::<f32>()) as u64;
+            tracing::info!(
+                database.name = file.name,
+                num_poses = database.num_poses(),
+                "motion database loaded"
+            );
+            Ok::<_, JobError>((database, bytes))
+        };
+        self.databases.get_or_load(file.blake3.clone(), load).await
+    }
+
+    /// The database with its index of windows of `window` frames.
+    ///
+    /// # Errors
+    /// As [`Self::database`], and if the window does not fit the database.
+    pub async fn get(&self, file: &MotionDatabaseFile, window: usize) -> Result<Prior, JobError> {
+        let database = self.database(file).await?;
+        let numbers = database.num_poses() * (window * database.num_dofs() + 17);
+        let bytes = (numbers * size_of::<f32>()) as u64;
+        let limit = self.indexes.capacity_bytes();
+        if bytes > limit {
+            let message = format!(
+                "windows of {window} frames of motion database {} take {bytes} bytes, this service keeps at most {limit}",
+                file.name
+            );
+            return Err(JobError::give_up(message, "raise MAREY_DATABASE_CACHE_BYTES"));
+        }
+        let make = {
+            let database = database.clone();
+            move || WindowIndex::new(&database, window)
+        };
+        let load = async {
+            let index =
+                compute::run(make).await.map_err(|e| JobError::give_up(e.to_string(), format!("{e:?}")))?;
+            Ok::<_, JobError>((index, bytes))
+        };
+        let index = self.indexes.get_or_load((file.blake3.clone(), window), load).await?;
+        Ok(Prior { database, index })
+    }
+}

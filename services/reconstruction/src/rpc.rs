@@ -1,0 +1,125 @@
+//! `marey.v1.Reconstruction`: poses at once.
+
+use crate::{Shared, error::CallError, payload::MotionDatabaseFile, priors::Prior};
+use kinematics::{Kinematics, Parametrisation, control_points};
+use model::{PointTrajectories, Skeleton};
+use proto::v1::{self, reconstruction_server::Reconstruction};
+use service::compute;
+use sparse::{Merged, Parameters, Reconstructor, Session};
+use std::{ops::ControlFlow, sync::Arc};
+use tokio::sync::Semaphore;
+use tokio_util::sync::CancellationToken;
+use tonic::{Request, Response, Status};
+use uuid::Uuid;
+
+const MAX_FRAMES: usize = 600;
+const DEFAULT_FRAME_RATE: f64 = 60.0;
+/// Rates outside would make very many frames of few, or none, Hz.
+const FRAME_RATES: std::ops::RangeInclusive<f64> = 10.0..=10_000.0;
+
+pub(crate) struct Rpc {
+    shared: Arc<Shared>,
+    /// Calls that compute at once: one a core, the rest wait.
+    slots: Semaphore,
+}
+
+impl Rpc {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        let slots = std::thread::available_parallelism().map_or(1, usize::from);
+        Self { shared, slots: Semaphore::new(slots) }
+    }
+
+    async fn solve(&self, request: v1::SolvePoseRequest) -> Result<v1::SolvePoseResponse, CallError> {
+        let id = proto::id("database_id", &request.database_id)?;
+        let frames = request.frames.len();
+        if !(1..=MAX_FRAMES).contains(&frames) {
+            return Err(out_of_range("frames", frames, "1 to 600 frames").into());
+        }
+        let rate = if request.frame_rate_hz == 0.0 { DEFAULT_FRAME_RATE } else { request.frame_rate_hz };
+        if !FRAME_RATES.contains(&rate) {
+            return Err(out_of_range("frame_rate_hz", rate, "10 to 10000").into());
+        }
+        let trajectories = proto::points::trajectories(&request.frames, rate)?;
+        let file = self.find(id).await?;
+        let parameters = Parameters::default();
+        let prior = self.shared.priors.get(&file, parameters.window).await.map_err(CallError::Prior)?;
+        // A failure to get a slot would mean that the semaphore was closed, which nobody does.
+        let _slot = self.slots.acquire().await;
+        let gone = CancellationToken::new();
+        let _when_dropped = gone.clone().drop_guard();
+        compute::run(move || {
+            let merged = solve(&prior, &request.skeleton_asf, &trajectories, &parameters, &gone)?;
+            Ok(answer(&merged))
+        })
+        .await
+    }
+
+    async fn find(&self, id: Uuid) -> Result<MotionDatabaseFile, CallError> {
+        let sql = "SELECT id, name, version, store_key, blake3 FROM motion_databases
+                   WHERE id = $1 AND store_key IS NOT NULL";
+        let row: Option<(Uuid, String, i32, String, String)> =
+            sqlx::query_as(sql).bind(id).fetch_optional(&self.shared.pool).await?;
+        let (id, name, version, store_key, blake3) = row.ok_or(CallError::NoSuchDatabase(id))?;
+        Ok(MotionDatabaseFile { id, name, version, store_key, blake3 })
+    }
+}
+
+#[tonic::async_trait]
+impl Reconstruction for Rpc {
+    async fn solve_pose(
+        &self,
+        request: Request<v1::SolvePoseRequest>,
+    ) -> Result<Response<v1::SolvePoseResponse>, Status> {
+        Ok(Response::new(self.solve(request.into_inner()).await?))
+    }
+}
+
+/// Reconstructs a few frames in one piece; `gone` stops it.
+fn solve(
+    prior: &Prior,
+    skeleton_asf: &str,
+    trajectories: &PointTrajectories,
+    parameters: &Parameters,
+    gone: &CancellationToken,
+) -> Result<Merged, CallError> {
+    let skeleton: Arc<Skeleton> = if skeleton_asf.is_empty() {
+        prior.database.skeleton().clone()
+    } else {
+        let read = formats::asf::read(skeleton_asf.as_bytes());
+        let in_file = |source| crate::InputError::File { file: "skeleton_asf".to_owned(), source };
+        read.map_err(in_file)?.value.skeleton
+    };
+    let points = control_points(&skeleton, trajectories.names()).map_err(crate::InputError::from)?;
+    let session = Session::new(skeleton, points, trajectories)?;
+    let frames = session.num_frames();
+    // One chunk, however long the frames are at 60 a second.
+    let parameters = Parameters { chunk_frames: frames.max(60), ..parameters.clone() };
+    let reconstructor = Reconstructor::new(&prior.database, &prior.index, &session, &parameters)?;
+    let mut progress =
+        |_| if gone.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+    let found = reconstructor.reconstruct(0..frames, &mut progress)?;
+    Ok(sparse::merge(&prior.database, &session, &parameters, &[found])?)
+}
+
+fn answer(merged: &Merged) -> v1::SolvePoseResponse {
+    let skeleton = merged.motion.skeleton();
+    let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
+    let mut state = kinematics.state();
+    let frames = merged.motion.poses().zip(&merged.quality).map(|(pose, quality)| {
+        kinematics.update(pose, &mut state);
+        v1::SolvedFrame {
+            pose: Some(proto::poses::to_wire(pose)),
+            joint_positions: state.positions.iter().map(proto::points::to_wire).collect(),
+            residual_m: quality.residual_m,
+        }
+    });
+    v1::SolvePoseResponse {
+        frames: frames.collect(),
+        dof_names: skeleton.dof_names(),
+        joint_names: skeleton.joints().iter().map(|j| j.name.clone()).collect(),
+    }
+}
+
+fn out_of_range(field: &'static str, found: impl ToString, expected: &'static str) -> proto::Error {
+    proto::Error::OutOfRange { field, found: found.to_string(), expected }
+}

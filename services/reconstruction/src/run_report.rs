@@ -1,0 +1,124 @@
+//! `run.json`: all that decided the result, and what it took.
+
+use crate::payload::{JobReport, MergeChunks, MotionDatabaseFile};
+use serde::Serialize;
+use sparse::{FrameQuality, Parameters};
+use std::collections::BTreeMap;
+use uuid::Uuid;
+
+/// Name of the result.
+pub(crate) const RUN: &str = "run.json";
+
+#[derive(Serialize)]
+pub(crate) struct RunReport<'a> {
+    run_id: Uuid,
+    kind: &'static str,
+    code: Code,
+    session: SessionReport<'a>,
+    motion_database: &'a MotionDatabaseFile,
+    parameters: &'a Parameters,
+    /// Nothing in this method is drawn at random.
+    seeds: [u64; 0],
+    quality: Summary,
+    warnings: &'a [String],
+    timings: Timings<'a>,
+}
+
+#[derive(Serialize)]
+struct Code {
+    version: &'static str,
+    /// Commit that it was built from, when the build said so.
+    commit: Option<&'static str>,
+}
+
+#[derive(Serialize)]
+struct SessionReport<'a> {
+    id: Uuid,
+    name: &'a str,
+    frames: usize,
+    frame_rate_hz: f64,
+    points: &'a [String],
+    mapping: &'a BTreeMap<String, String>,
+    files: Vec<FileReport<'a>>,
+}
+
+#[derive(Serialize)]
+struct FileReport<'a> {
+    name: &'a str,
+    role: &'a str,
+    bytes: u64,
+    blake3: &'a str,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    mean_residual_m: f64,
+    max_residual_m: f64,
+    mean_sigma_rad: f64,
+    frames_without_measurement: usize,
+}
+
+#[derive(Serialize)]
+struct Timings<'a> {
+    plan: &'a JobReport,
+    chunks: &'a [JobReport],
+    merge: &'a JobReport,
+    /// Computed frames a second over all chunks, warm-up and blending included.
+    frames_per_second: f64,
+}
+
+impl<'a> RunReport<'a> {
+    /// Of a run that has just been merged.
+    pub fn new(
+        run_id: Uuid,
+        job: &'a MergeChunks,
+        quality: &[FrameQuality],
+        chunks: &'a [JobReport],
+        merge: &'a JobReport,
+    ) -> Self {
+        let request = &job.request;
+        let file = |f: &'a crate::InputFile| FileReport {
+            name: &f.name,
+            role: &f.role,
+            bytes: f.bytes,
+            blake3: &f.blake3,
+        };
+        let seconds: f64 = chunks.iter().map(|c| c.seconds).sum();
+        let frames: usize = chunks.iter().map(|c| c.frames).sum();
+        Self {
+            run_id,
+            kind: "reconstruction",
+            code: Code { version: env!("CARGO_PKG_VERSION"), commit: option_env!("MAREY_COMMIT") },
+            session: SessionReport {
+                id: request.session_id,
+                name: &request.session_name,
+                frames: quality.len(),
+                frame_rate_hz: motion_db::FRAME_RATE,
+                points: &job.points,
+                mapping: &request.mapping,
+                files: request.files.iter().map(file).collect(),
+            },
+            motion_database: &request.motion_database,
+            parameters: &request.parameters,
+            seeds: [],
+            quality: summary(quality),
+            warnings: &job.warnings,
+            timings: Timings {
+                plan: &job.plan,
+                chunks,
+                merge,
+                frames_per_second: if seconds > 0.0 { frames as f64 / seconds } else { 0.0 },
+            },
+        }
+    }
+}
+
+fn summary(quality: &[FrameQuality]) -> Summary {
+    let count = quality.len().max(1) as f64;
+    Summary {
+        mean_residual_m: quality.iter().map(|q| q.residual_m).sum::<f64>() / count,
+        max_residual_m: quality.iter().map(|q| q.residual_m).fold(0.0, f64::max),
+        mean_sigma_rad: quality.iter().map(|q| q.sigma_rad).sum::<f64>() / count,
+        frames_without_measurement: quality.iter().filter(|q| q.measured_points == 0).count(),
+    }
+}
