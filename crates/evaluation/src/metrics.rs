@@ -1,4 +1,7 @@
-use kinematics::{Kinematics, Parametrisation, nearest_equivalent, rotation_from_angles, unwrap_near};
+use kinematics::{
+    Kinematics, Parametrisation, can_flip, nearest_equivalent, nearest_flip, rotation_from_angles,
+    unwrap_near,
+};
 use model::{ChannelKind, Joint, Motion, Skeleton};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -33,7 +36,7 @@ pub fn compare(truth: &Motion, found: &Motion) -> Errors {
     for frame in 0..frames {
         let (t, f) = (truth.pose(frame), found.pose(frame));
         for (j, joint) in skeleton.joints().iter().enumerate().skip(1) {
-            sums.add_joint(joint, &t[skeleton.dofs(j)], &f[skeleton.dofs(j)]);
+            sums.add_joint(joint, can_flip(skeleton, j), &t[skeleton.dofs(j)], &f[skeleton.dofs(j)]);
         }
         kinematics.update(t, &mut true_state);
         kinematics.update(f, &mut found_state);
@@ -70,7 +73,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn add_joint(&mut self, joint: &Joint, truth: &[f64], found: &[f64]) {
+    fn add_joint(&mut self, joint: &Joint, can_flip: bool, truth: &[f64], found: &[f64]) {
         let slot = |axis| {
             joint.channels.iter().position(|c| c.kind == ChannelKind::Rotation && c.axis == axis).unwrap_or(0)
         };
@@ -82,6 +85,7 @@ impl Sums {
         let f: Vec<f64> = slots.iter().map(|&s| found[s]).collect();
         let nearest: Vec<f64> = match (&t[..], &f[..]) {
             (&[t0, t1, t2], &[f0, f1, f2]) => nearest_equivalent([f0, f1, f2], [t0, t1, t2]).to_vec(),
+            (&[t0, t1], &[f0, f1]) if can_flip => nearest_flip([f0, f1], [t0, t1]).to_vec(),
             _ => f.iter().zip(&t).map(|(f, t)| unwrap_near(*f, *t)).collect(),
         };
         for (n, t) in nearest.iter().zip(&t) {

@@ -1,7 +1,7 @@
 use std::f64::consts::{PI, TAU};
 
-use model::Axis;
-use nalgebra::{Matrix3, Rotation3};
+use model::{Axis, Skeleton};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// `angle` plus the multiple of 2π that brings it nearest to `near`, radians.
 pub fn unwrap_near(angle: f64, near: f64) -> f64 {
@@ -50,6 +50,28 @@ pub fn nearest_equivalent(angles: [f64; 3], near: [f64; 3]) -> [f64; 3] {
     if distance(&second) < distance(&first) { second } else { first }
 }
 
+/// Whether a joint's two rotations can be flipped without moving its bone: nothing hangs from it and its bone lies along
+/// the third axis. Then angles (α, β), leftmost first, and (α + π, π − β) differ by half a turn of the bone about
+/// itself. Recorded thumbs jump between the two from one frame to the next.
+pub fn can_flip(skeleton: &Skeleton, joint_index: usize) -> bool {
+    let joint = &skeleton.joints()[joint_index];
+    let [a, b] = joint.rotation_order[..] else { return false };
+    let third = Vector3::ith(3 - a.index() - b.index(), 1.0);
+    let tip = joint.axes.inverse() * joint.tip;
+    a != b
+        && skeleton.joints().iter().all(|j| j.parent != Some(joint_index))
+        && tip.norm() > 0.0
+        && tip.cross(&third).norm() < 1e-3 * tip.norm()
+}
+
+/// Of the pairs of angles that put the bone of a joint that [`can_flip`] in the same place, the nearest to `near`.
+pub fn nearest_flip([alpha, beta]: [f64; 2], near: [f64; 2]) -> [f64; 2] {
+    let unwrapped = |x: [f64; 2]| [unwrap_near(x[0], near[0]), unwrap_near(x[1], near[1])];
+    let distance = |x: &[f64; 2]| (x[0] - near[0]).powi(2) + (x[1] - near[1]).powi(2);
+    let (first, second) = (unwrapped([alpha, beta]), unwrapped([alpha + PI, PI - beta]));
+    if distance(&second) < distance(&first) { second } else { first }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,6 +85,15 @@ mod tests {
         [Axis::Z, Axis::X, Axis::Y],
         [Axis::Z, Axis::Y, Axis::X],
     ];
+
+    #[test]
+    fn a_flip_leaves_the_bone_where_it_is() {
+        let order = [Axis::Z, Axis::X];
+        let [a, b] = nearest_flip([0.3, 0.4], [0.3 + PI, PI - 0.4]);
+        assert!((a - 0.3 - PI).abs() < 1e-12 && (b + 0.4 - PI).abs() < 1e-12);
+        let bone = |angles: &[f64]| rotation_from_angles(&order, angles) * Vector3::y();
+        assert!((bone(&[0.3, 0.4]) - bone(&[a, b])).norm() < 1e-12);
+    }
 
     proptest! {
         #[test]

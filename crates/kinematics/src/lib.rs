@@ -26,7 +26,9 @@ mod points;
 mod rotation_vector;
 
 pub use error::Error;
-pub use euler::{angles_from_rotation, nearest_equivalent, rotation_from_angles, unwrap_near};
+pub use euler::{
+    angles_from_rotation, can_flip, nearest_equivalent, nearest_flip, rotation_from_angles, unwrap_near,
+};
 pub use forward::{Kinematics, State};
 pub use jacobian::check_jacobian;
 pub use parametrisation::{HEADING, Parametrisation, ROOT_DOFS, References};

@@ -3,7 +3,7 @@ use std::f64::consts::PI;
 use model::{Axis, Channel, ChannelKind, Skeleton};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::euler::{angles_from_rotation, rotation_from_angles, unwrap_near};
+use crate::euler::{angles_from_rotation, can_flip, nearest_flip, rotation_from_angles, unwrap_near};
 use crate::rotation_vector::{nearest_rotation_vector, rotation_exp, rotation_log};
 use crate::{Error, Result};
 
@@ -55,13 +55,20 @@ pub struct Parametrisation {
     pub(crate) translations: Vec<Vec<(usize, Axis)>>,
     /// middle of each angle's range, shape `[dofs]`
     centres: Vec<f64>,
+    /// DOFs (leftmost first) of the joints whose bones may be flipped, see [`can_flip`]
+    flips: Vec<[usize; 2]>,
 }
 
 impl Parametrisation {
     /// The file's own channels.
     pub fn channels(skeleton: &Skeleton) -> Self {
         let joints = (0..skeleton.num_joints()).map(|j| channel_angles(skeleton, j)).collect();
-        Self { joints, translations: translations(skeleton), centres: vec![0.0; skeleton.num_dofs()] }
+        Self {
+            joints,
+            translations: translations(skeleton),
+            centres: vec![0.0; skeleton.num_dofs()],
+            flips: Vec::new(),
+        }
     }
 
     /// Smooth coordinates about `references`.
@@ -97,7 +104,12 @@ impl Parametrisation {
             }
             debug_assert!(joint.channels.len() == skeleton.dofs(j).len());
         }
-        Ok(Self { joints, translations, centres: references.angles.clone() })
+        let flips = joints.iter().enumerate().filter_map(|(j, rotation)| match rotation {
+            JointRotation::Angles(angles) if can_flip(skeleton, j) => Some([angles[0].0, angles[1].0]),
+            _ => None,
+        });
+        let flips = flips.collect();
+        Ok(Self { joints, translations, centres: references.angles.clone(), flips })
     }
 
     /// Whether the coordinate is an angle in radians (otherwise a translation in metres).
@@ -122,8 +134,7 @@ impl Parametrisation {
             match &self.joints[j] {
                 JointRotation::Angles(angles) => {
                     for (dof, axis) in angles {
-                        let angle = base_value(&joint.channels, base, ChannelKind::Rotation, *axis, pose);
-                        out[*dof] = unwrap_near(angle, self.centres[*dof]);
+                        out[*dof] = base_value(&joint.channels, base, ChannelKind::Rotation, *axis, pose);
                     }
                 }
                 JointRotation::Vector { first_dof, reference } => {
@@ -141,6 +152,7 @@ impl Parametrisation {
                 }
             }
         }
+        self.wrap(out);
     }
 
     /// Brings every angle but the heading back to within half a turn of its reference, in place: the same pose.
@@ -161,6 +173,9 @@ impl Parametrisation {
                 }
                 JointRotation::HeadingTilt { .. } => {}
             }
+        }
+        for &[a, b] in &self.flips {
+            [x[a], x[b]] = nearest_flip([x[a], x[b]], [self.centres[a], self.centres[b]]);
         }
     }
 

@@ -4,7 +4,7 @@ use kinematics::{HEADING, Kinematics, Parametrisation, References, rotation_from
 use model::{Motion, Skeleton};
 use nalgebra::Matrix3;
 
-use crate::database::FRAME_RATE;
+use crate::database::{FRAME_RATE, proportions};
 use crate::{ClipInfo, Error, MotionDatabase, Result};
 
 /// Shortest clip that is kept, frames at 60 a second.
@@ -103,6 +103,7 @@ impl MotionDatabase {
             action: clip.action.clone(),
             first_pose,
             num_poses,
+            proportions: proportions(clip.motion.skeleton()),
         });
         Ok(())
     }

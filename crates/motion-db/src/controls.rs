@@ -2,16 +2,24 @@ use kinematics::{Kinematics, PointSet};
 use model::Skeleton;
 use nalgebra::Vector3;
 
+use crate::database::proportions;
 use crate::search::Blocks;
-use crate::{HeadingFrame, MotionDatabase, SkeletonSize, WindowIndex};
+use crate::{ClipInfo, HeadingFrame, MotionDatabase, SkeletonSize, WindowIndex};
 
-/// Where a session's control points would be in every pose of a database, on the performer's own skeleton.
+/// Where a session's control points would be in every pose of a database, on the performer's own skeleton; and how
+/// unlike that skeleton each clip's is.
+///
+/// Recordings differ in their zero pose from one performer and calibration to the next by more than windows of motion
+/// differ (method §2). A performer's skeleton tells which clips are their own.
 #[derive(Debug, Clone)]
 pub struct ControlTable {
     points: usize,
+    /// distance of each clip's skeleton from the performer's, centimetres, shape `[clips]`
+    unlikeness: Vec<f64>,
     /// shape `[poses, points]`, metres, where the pose was recorded
     world: Vec<[f32; 3]>,
-    /// of each window's target pose, relative to the heading frame before it, centimetres, `[rows, 3·points]`
+    /// of each window's target pose, relative to the heading frame before it, centimetres, and last the unlikeness of
+    /// its clip, `[rows, 3·points + 1]`
     pub(crate) relative: Blocks,
 }
 
@@ -39,20 +47,32 @@ impl ControlTable {
             world.extend(found.iter().map(|p| [p.x as f32, p.y as f32, p.z as f32]));
         }
         let num_points = points.len();
-        let relative = Blocks::new(index.num_rows(), 3 * num_points, |row, out| {
+        let own = proportions(skeleton);
+        let distance = |clip: &ClipInfo| {
+            let squares: f64 = own.iter().zip(&clip.proportions).map(|(a, b)| (a - b).powi(2)).sum();
+            squares.sqrt() * 100.0
+        };
+        let unlikeness: Vec<f64> = database.clips().iter().map(distance).collect();
+        let relative = Blocks::new(index.num_rows(), 3 * num_points + 1, |row, out| {
             let target = index.target(row);
-            for (point, out) in out.chunks_exact_mut(3).enumerate() {
+            out[3 * num_points] = unlikeness[database.clip_of(target)] as f32;
+            for (point, out) in out.chunks_exact_mut(3).take(num_points).enumerate() {
                 let p = world[target * num_points + point].map(f64::from);
                 let local = frames[target - 1].local_from_world(&Vector3::from(p)) * 100.0;
                 out.copy_from_slice(&[local.x as f32, local.y as f32, local.z as f32]);
             }
         });
-        Self { points: num_points, world, relative }
+        Self { points: num_points, unlikeness, world, relative }
     }
 
     /// Number of points P.
     pub fn num_points(&self) -> usize {
         self.points
+    }
+
+    /// Distance of a clip's skeleton from the performer's: root of the summed squares of all offsets, centimetres.
+    pub fn unlikeness(&self, clip: usize) -> f64 {
+        self.unlikeness[clip]
     }
 
     /// World positions of the points in a recorded pose, metres, shape `[points]`.

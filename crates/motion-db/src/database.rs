@@ -7,7 +7,7 @@ use model::Skeleton;
 pub const FRAME_RATE: f64 = 60.0;
 
 /// One recorded clip of a database.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ClipInfo {
     /// name, unique in the database (`16_15`)
     pub name: String,
@@ -19,6 +19,18 @@ pub struct ClipInfo {
     pub first_pose: usize,
     /// number of poses
     pub num_poses: usize,
+    /// proportions of the clip's skeleton, see [`proportions`]
+    pub(crate) proportions: Vec<f64>,
+}
+
+/// Offset of every joint and tip from its parent, metres, shape `[6·joints]`: what tells one performer's skeleton from
+/// another's.
+pub(crate) fn proportions(skeleton: &Skeleton) -> Vec<f64> {
+    skeleton
+        .joints()
+        .iter()
+        .flat_map(|j| j.offset.iter().chain(j.tip.iter()).copied().collect::<Vec<_>>())
+        .collect()
 }
 
 /// Recorded motion at 60 frames a second, ready to be searched.

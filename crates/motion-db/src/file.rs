@@ -31,6 +31,7 @@ struct ClipRecord {
     subject: String,
     action: String,
     num_poses: usize,
+    proportions_m: Vec<f64>,
 }
 
 impl MotionDatabase {
@@ -60,6 +61,7 @@ impl MotionDatabase {
                     subject: c.subject.clone(),
                     action: c.action.clone(),
                     num_poses: c.num_poses,
+                    proportions_m: c.proportions.clone(),
                 })
                 .collect(),
         };
@@ -136,6 +138,9 @@ impl MotionDatabase {
         let mut clips = Vec::with_capacity(header.clips.len());
         let mut first_pose = 0usize;
         for clip in header.clips {
+            if clip.proportions_m.len() != 6 * skeleton.num_joints() {
+                return Err(format!("{} proportions of clip {}", clip.proportions_m.len(), clip.name));
+            }
             let next = first_pose.checked_add(clip.num_poses).ok_or("a number of poses past all bounds")?;
             clips.push(ClipInfo {
                 name: clip.name,
@@ -143,6 +148,7 @@ impl MotionDatabase {
                 action: clip.action,
                 first_pose,
                 num_poses: clip.num_poses,
+                proportions: clip.proportions_m,
             });
             first_pose = next;
         }

@@ -87,8 +87,8 @@ pub struct Neighbour {
 pub struct Query<'a> {
     /// window in principal axes, shape `[width]`
     pub features: &'a [f32],
-    /// control points of the frame sought, shape `[3·points]`, centimetres, with a weight per number (0 where it was
-    /// not measured): they join the distance
+    /// control points of the frame sought, centimetres, and a 0 for the unlikeness of skeletons, shape `[3·points + 1]`,
+    /// with a weight per number (0 where it was not measured): they join the distance
     pub controls: Option<(&'a ControlTable, &'a [f32], &'a [f32])>,
     /// rows that may not be found (the trial under test), in rising order
     pub exclude: &'a [Range<usize>],

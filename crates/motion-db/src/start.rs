@@ -13,7 +13,7 @@ pub struct StartPose {
     pub turn: f64,
     /// where the database's origin comes to lie, metres
     pub shift: [f64; 2],
-    /// root mean square distance of the control points after that, metres
+    /// root mean square distance of the control points after that, metres, with the unlikeness of skeletons
     pub distance: f64,
 }
 
@@ -24,7 +24,8 @@ const DISTINCT_FRAMES: usize = 6;
 /// over the frames `offsets` fit the observed ones best, after the best turn about y and shift on the floor.
 ///
 /// `observed`: world positions (metres), shape `[offsets, points]`, `None` where not measured; `history`: number of
-/// frames that must come before the pose in its clip; `exclude`: ranges of poses not to be used, in rising order.
+/// frames that must come before the pose in its clip; `skeleton_weight`: metres that a metre of unlikeness between
+/// skeletons counts for; `exclude`: ranges of poses not to be used, in rising order.
 /// Best first, at most `count`, no two within 6 frames of each other.
 pub fn start_poses(
     database: &MotionDatabase,
@@ -32,19 +33,21 @@ pub fn start_poses(
     offsets: &[usize],
     observed: &[Option<Vector3<f64>>],
     history: usize,
+    skeleton_weight: f64,
     exclude: &[Range<usize>],
     count: usize,
 ) -> Vec<StartPose> {
     let last = offsets.iter().copied().max().unwrap_or(0);
     let mut all = Vec::new();
-    for clip in database.clips() {
+    for (index, clip) in database.clips().iter().enumerate() {
+        let unlike = skeleton_weight * table.unlikeness(index) / 100.0;
         let end = (clip.first_pose + clip.num_poses).saturating_sub(last);
         for pose in clip.first_pose + history..end {
             if exclude.iter().any(|r| r.contains(&pose)) {
                 continue;
             }
             if let Some(start) = fit(table, pose, offsets, observed) {
-                all.push(start);
+                all.push(StartPose { distance: start.distance.hypot(unlike), ..start });
             }
         }
     }

@@ -64,6 +64,10 @@ pub struct Parameters {
     pub control_points_in_query: bool,
     /// degrees that one centimetre between control points counts for in the search and the regression
     pub control_weight: f64,
+    /// degrees that one centimetre between the performer's skeleton and a clip's counts for in the search
+    pub skeleton_weight: f64,
+    /// metres between control points that a metre between skeletons counts for in the search for a start
+    pub start_skeleton_weight: f64,
     /// standard deviation of a control point's coordinate, metres
     pub control_sigma_m: f64,
     /// which covariance the prior has
@@ -102,6 +106,8 @@ impl Default for Parameters {
             neighbours: 64,
             control_points_in_query: true,
             control_weight: 1.0,
+            skeleton_weight: 2.0,
+            start_skeleton_weight: 0.3,
             control_sigma_m: 0.0015,
             covariance: Covariance::default(),
             ridge_deg: 3.0,
@@ -148,6 +154,8 @@ impl Parameters {
         count("warm_up_frames", self.warm_up_frames, 0, 6_000, "0 to 6000 frames")?;
         count("blend_frames", self.blend_frames, 0, 60, "0 to 60 frames")?;
         number("control_weight", self.control_weight, 0.0, 1e3, "0 to 1000 degrees per centimetre")?;
+        number("skeleton_weight", self.skeleton_weight, 0.0, 1e3, "0 to 1000 degrees per centimetre")?;
+        number("start_skeleton_weight", self.start_skeleton_weight, 0.0, 1e3, "0 to 1000")?;
         number("control_sigma_m", self.control_sigma_m, 1e-5, 1.0, "0.00001 to 1 m")?;
         number("ridge_deg", self.ridge_deg, 1e-3, 1e3, "0.001 to 1000 degrees")?;
         number("ridge_distance", self.ridge_distance, 0.0, 1e3, "0 to 1000")?;

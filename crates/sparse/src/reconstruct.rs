@@ -226,6 +226,7 @@ impl<'a> Reconstructor<'a> {
             &offsets,
             &observed,
             self.parameters.window,
+            self.parameters.start_skeleton_weight,
             &self.exclude_poses,
             self.parameters.start_candidates,
         );

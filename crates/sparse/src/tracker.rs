@@ -97,6 +97,8 @@ impl<'a> Tracker<'a> {
             Method::LocalRegression => Box::new(LocalRegression::new(k, width, dofs)),
             Method::Nearest => Box::new(NearestExample),
         };
+        let mut control_weights = vec![0.0; num_controls + 1];
+        control_weights[num_controls] = parameters.skeleton_weight.powi(2) as f32;
         let per_dof = &index.scale().per_dof;
         Self {
             scale: database.leg_length() / SkeletonSize::leg_length(&session.skeleton),
@@ -114,8 +116,8 @@ impl<'a> Tracker<'a> {
             features: vec![0.0; index.width()],
             query: vec![0.0; width],
             query_single: vec![0.0; index.width()],
-            controls: vec![0.0; num_controls],
-            control_weights: vec![0.0; num_controls],
+            controls: vec![0.0; num_controls + 1],
+            control_weights,
             control_factors: vec![0.0; num_controls],
             measured: vec![None; points.len()],
             local: vec![0.0; dofs],
@@ -225,11 +227,11 @@ impl<'a> Tracker<'a> {
         // The successors of the last matches are near now.
         track.matches.iter_mut().for_each(|row| *row += 1);
         track.matches.sort_unstable();
-        let controls = self.parameters.control_points_in_query.then_some((
-            self.table,
-            &self.controls[..],
-            &self.control_weights[..],
-        ));
+        if !self.parameters.control_points_in_query {
+            let points = self.control_weights.len() - 1;
+            self.control_weights[..points].fill(0.0);
+        }
+        let controls = Some((self.table, &self.controls[..], &self.control_weights[..]));
         let query =
             Query { features: &self.query_single, controls, exclude: self.exclude, hints: &track.matches };
         self.index.nearest(&query, self.parameters.neighbours, &mut self.search, &mut self.neighbours);
