@@ -1,1 +1,9 @@
-//! Whole-system tests.
+//! What whole-system tests stand on: a [`System`] of real services on a real database, spoken to by [`Api`] over real
+//! HTTP, with [`trials`] of known motion.
+
+pub mod api;
+pub mod system;
+pub mod trials;
+
+pub use api::{Answer, Api};
+pub use system::System;

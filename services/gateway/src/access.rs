@@ -77,6 +77,17 @@ pub async fn ensure_key(db: &PgPool, key: &str) -> sqlx::Result<()> {
     insert_key(&mut *db.acquire().await?, "default", "bootstrap", &Scope::ALL, key).await
 }
 
+/// Whether `key` is valid.
+///
+/// # Errors
+/// If the database fails.
+pub async fn is_known(connection: &mut PgConnection, key: &str) -> sqlx::Result<bool> {
+    sqlx::query_scalar("SELECT EXISTS (SELECT FROM api_keys WHERE hash = $1 AND revoked_at IS NULL)")
+        .bind(hash(key))
+        .fetch_one(connection)
+        .await
+}
+
 async fn insert_key(
     connection: &mut PgConnection,
     project: &str,

@@ -1,2 +1,5 @@
-//! The marey command line.
-fn main() {}
+//! The `marey` command.
+
+fn main() -> std::process::ExitCode {
+    marey::main()
+}

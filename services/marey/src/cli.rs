@@ -1,0 +1,129 @@
+//! The command line, as `marey --help` tells it.
+
+use clap::{Parser, Subcommand};
+
+use crate::{
+    cmu, connection::Server, database, demo, evaluate, health, keys, results, run, sample, serve, status, up,
+    upload,
+};
+
+/// Full-body motion from a few control points.
+///
+/// You measured a few points of a moving person (wrists, ankles, head, …) and want the whole body: Marey finds the most
+/// probable motion, learned from recordings like it, and gives it to you as BVH for Blender, Maya or Unity, as AMC and as CSV.
+#[derive(Debug, Parser)]
+#[command(name = "marey", version, max_term_width = 100, after_help = EXAMPLES)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+See it work, without any data of your own:
+  marey demo
+
+First session:
+  marey up                                      start everything; leave it running
+  marey db build walks recordings/ --watch      learn from a folder of ASF+AMC or BVH files
+  marey upload \"take 3\" points.csv skeleton.asf
+  marey run \"take 3\" --database walks --watch
+  marey results RUN -o take3/                   then open take3/motion.bvh
+
+Commands that talk to a server find one started by `marey up` in this folder or above. For another:
+  export MAREY_URL=https://mocap.example MAREY_API_KEY=mk_…";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Show what Marey does, on motion of its own or on yours
+    Demo(demo::Args),
+    /// Start everything on this machine
+    Up(up::Args),
+    /// Build and list motion databases: the recordings that Marey learns from
+    #[command(subcommand)]
+    Db(database::Command),
+    /// Upload the files of a session: control points, skeleton, true motion
+    Upload(upload::Args),
+    /// Reconstruct a session's motion
+    Run(run::Args),
+    /// Download what a run has made
+    Results(results::Args),
+    /// Show runs and how far they are
+    Status(status::Args),
+    /// Cancel a run
+    Cancel(status::CancelArgs),
+    /// Measure how well motion is reconstructed, on recordings of your own
+    Evaluate(evaluate::Args),
+    /// Write synthetic recordings to try things with
+    Sample(sample::Args),
+    /// Get recorded motion from public collections
+    #[command(subcommand)]
+    Data(Data),
+    /// Run one service, configured by MAREY_… variables
+    #[command(subcommand)]
+    Serve(serve::Service),
+    /// Bring a database's schema up to date
+    Migrate(keys::MigrateArgs),
+    /// Make API keys
+    #[command(subcommand)]
+    Key(keys::Command),
+    /// Ask a service whether it is well; for probes
+    Health(health::Args),
+}
+
+#[derive(Debug, Subcommand)]
+enum Data {
+    /// Download ASF and AMC files of the CMU Graphics Lab Motion Capture Database
+    Cmu(cmu::Args),
+}
+
+/// Runs one command.
+pub fn run(cli: Cli) -> anyhow::Result<()> {
+    match cli.command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Up(args) => up::run(&args),
+        Command::Db(command) => database::run(&command),
+        Command::Upload(args) => upload::run(&args),
+        Command::Run(args) => run::run(&args),
+        Command::Results(args) => results::run(&args),
+        Command::Status(args) => status::run(&args),
+        Command::Cancel(args) => status::cancel(&args),
+        Command::Evaluate(args) => evaluate::run(args),
+        Command::Sample(args) => sample::run(&args),
+        Command::Data(Data::Cmu(args)) => cmu::run(&args),
+        Command::Serve(service) => serve::run(&service),
+        Command::Migrate(args) => keys::migrate(&args),
+        Command::Key(command) => keys::run(&command),
+        Command::Health(args) => health::run(&args),
+    }
+}
+
+/// The server to talk to, and the client for it.
+#[derive(Debug, clap::Args)]
+pub struct ServerArgs {
+    /// Server to talk to, such as http://127.0.0.1:8080; else the one that `marey up` started here
+    #[arg(long, env = "MAREY_URL", global = true, help_heading = "Server")]
+    url: Option<String>,
+    /// Key to the server's project
+    #[arg(long, env = "MAREY_API_KEY", global = true, hide_env_values = true, help_heading = "Server")]
+    api_key: Option<String>,
+}
+
+impl ServerArgs {
+    /// The server meant.
+    ///
+    /// # Errors
+    /// If none is named and none was started here.
+    pub fn server(&self) -> anyhow::Result<Server> {
+        Server::find(self.url.clone(), self.api_key.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Cli::command().debug_assert();
+    }
+}

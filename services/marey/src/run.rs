@@ -1,0 +1,102 @@
+//! `marey run`.
+
+use anyhow::Context;
+use serde_json::{Map, Value, json};
+
+use crate::{
+    cli::ServerArgs,
+    client::{Client, Run},
+    watch,
+};
+
+/// `marey run`
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  marey run \"take 3\" --database walks --watch
+  marey run \"take 3\" --database walks@2 --points left_wrist,right_wrist,left_ankle,right_ankle
+  marey run \"take 3\" --database walks --map LWRA=left_wrist --map RWRA=right_wrist
+  marey run \"take 3\" --database walks --set chunk_frames=1200")]
+pub struct Args {
+    /// The session: its name or id
+    session: String,
+    /// Motion database to learn from: NAME (its latest version) or NAME@VERSION
+    #[arg(long, short)]
+    database: String,
+    /// Control points to use, separated by commas [default: all in the file]
+    #[arg(long, value_delimiter = ',')]
+    points: Vec<String>,
+    /// Which marker of the file is which control point: MARKER=POINT; may be given often
+    #[arg(long = "map", value_name = "MARKER=POINT")]
+    mapping: Vec<String>,
+    /// local-regression, or nearest for a plain baseline [default: local-regression]
+    #[arg(long)]
+    method: Option<String>,
+    /// Frames of history to look at
+    #[arg(long)]
+    window: Option<u32>,
+    /// Neighbours to learn from
+    #[arg(long)]
+    neighbours: Option<u32>,
+    /// Any other parameter of the method: NAME=VALUE; may be given often
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    parameters: Vec<String>,
+    /// Show the progress and wait for the end
+    #[arg(long, short)]
+    watch: bool,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// Runs `marey run`.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let client = Client::new(args.server.server()?);
+    let session = client
+        .find_session(&args.session)?
+        .with_context(|| format!("there is no session {:?}; upload its files first", args.session))?;
+    let run: Run = client.post(&format!("/v1/sessions/{}/runs", session.id), &request(args)?)?;
+    println!("run {}", run.id);
+    if args.watch {
+        watch::until_end(&client, &run.id)?;
+        println!("done; download the motion with\n  marey results {} -o FOLDER", run.id);
+    }
+    Ok(())
+}
+
+fn request(args: &Args) -> anyhow::Result<Value> {
+    let mut request = json!({ "motion_database": args.database });
+    let named = [
+        ("points", (!args.points.is_empty()).then(|| json!(args.points))),
+        (
+            "mapping",
+            (!args.mapping.is_empty()).then(|| pairs(&args.mapping, |point| point.into())).transpose()?,
+        ),
+        ("method", args.method.as_ref().map(|m| json!(m))),
+        ("window", args.window.map(Value::from)),
+        ("neighbours", args.neighbours.map(Value::from)),
+        (
+            "parameters",
+            // a number or true where it reads as one, else a word
+            (!args.parameters.is_empty())
+                .then(|| pairs(&args.parameters, |v| serde_json::from_str(v).unwrap_or_else(|_| v.into())))
+                .transpose()?,
+        ),
+    ];
+    for (name, value) in named {
+        if let Some(value) = value {
+            request[name] = value;
+        }
+    }
+    Ok(request)
+}
+
+fn pairs(given: &[String], value: impl Fn(&str) -> Value) -> anyhow::Result<Value> {
+    given
+        .iter()
+        .map(|pair| {
+            let (name, text) =
+                pair.split_once('=').with_context(|| format!("{pair:?} is not of the form NAME=VALUE"))?;
+            Ok((name.trim().to_owned(), value(text.trim())))
+        })
+        .collect::<anyhow::Result<Map<_, _>>>()
+        .map(Value::Object)
+}

@@ -1,0 +1,52 @@
+//! `marey serve`: one service as a process of its own.
+
+use anyhow::Context;
+use service::config::{TelemetryConfig, Variables, environment};
+
+/// `marey serve …`
+#[derive(Debug, clap::Subcommand)]
+pub enum Service {
+    /// The HTTP interface
+    ///
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:8080), MAREY_MAX_UPLOAD_BYTES (536870912) and
+    /// MAREY_BOOTSTRAP_KEY may be.
+    Gateway,
+    /// Builds motion databases and answers queries on them
+    ///
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50051), MAREY_WORKER_CONCURRENCY and others
+    /// may be.
+    MotionIndex,
+    /// Reconstructs motion
+    ///
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50052), MAREY_WORKER_CONCURRENCY and others
+    /// may be.
+    Reconstruction,
+}
+
+/// Runs `marey serve` until SIGTERM or SIGINT.
+pub fn run(which: &Service) -> anyhow::Result<()> {
+    let variables = Variables::new(&environment);
+    service::telemetry::start(&TelemetryConfig::from_variables(&variables)?)?;
+    runtime()?.block_on(async {
+        let shutdown = service::shutdown::on_signal()?;
+        match which {
+            Service::Gateway => {
+                let config = gateway::Config::from_variables(environment)?;
+                gateway::run(config, shutdown).await
+            }
+            Service::MotionIndex => {
+                let config = service::Config::from_variables(&variables, motion_index::DEFAULT_LISTEN)?;
+                Ok(motion_index::run(config, shutdown).await?)
+            }
+            Service::Reconstruction => {
+                let config = service::Config::from_variables(&variables, reconstruction::DEFAULT_LISTEN)?;
+                Ok(reconstruction::run(config, shutdown).await?)
+            }
+        }
+    })
+}
+
+/// The runtime of everything that serves.
+pub fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_multi_thread().enable_all().build().context("the runtime can't be started")
+}

@@ -1,0 +1,120 @@
+//! Watching a run: a progress bar on a terminal, a line now and then elsewhere.
+
+use std::{
+    io::{BufRead, BufReader, IsTerminal},
+    time::Duration,
+};
+
+use anyhow::bail;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Deserialize;
+
+use crate::client::Client;
+
+/// Between two tries to connect.
+const RETRY: Duration = Duration::from_secs(1);
+/// Tries before giving up, when not even the first word comes.
+const MAX_TRIES: u32 = 30;
+
+/// How far a run is, as `/events` tells it.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Progress {
+    /// queued, running, succeeded, failed, cancelled
+    pub state: String,
+    /// 0 to 1
+    pub progress: f64,
+    /// what is being done
+    pub phrase: String,
+    /// why it failed
+    pub error: Option<String>,
+}
+
+/// Shows a run's progress until it ends.
+///
+/// # Errors
+/// If it fails or is cancelled, or the server can't be reached any more.
+pub fn until_end(client: &Client, run_id: &str) -> anyhow::Result<()> {
+    let mut display = Display::new();
+    let end = follow(client, run_id, |progress| display.show(progress));
+    display.close();
+    let end = end?;
+    match end.state.as_str() {
+        "succeeded" => Ok(()),
+        "failed" => bail!("the run failed: {}", end.error.unwrap_or_default()),
+        state => bail!("the run was {state}"),
+    }
+}
+
+/// Follows a run's events until it ends, connecting again when the connection breaks.
+fn follow(client: &Client, run_id: &str, mut show: impl FnMut(&Progress)) -> anyhow::Result<Progress> {
+    let path = format!("/v1/runs/{run_id}/events");
+    let mut failures = 0;
+    loop {
+        match client.open(&path) {
+            Ok(response) => {
+                failures = 0;
+                let mut lines = BufReader::new(response.into_body().into_reader()).lines();
+                // a stream that breaks off is as good as one that ends: connect again
+                while let Some(Ok(line)) = lines.next() {
+                    let Some(data) = line.strip_prefix("data:") else { continue };
+                    let progress: Progress = serde_json::from_str(data)?;
+                    show(&progress);
+                    if matches!(progress.state.as_str(), "succeeded" | "failed" | "cancelled") {
+                        return Ok(progress);
+                    }
+                }
+            }
+            Err(error) => {
+                failures += 1;
+                if failures > MAX_TRIES || !error.to_string().contains("does not answer") {
+                    return Err(error);
+                }
+            }
+        }
+        std::thread::sleep(RETRY);
+    }
+}
+
+enum Display {
+    Bar(ProgressBar),
+    Lines { last_percent: u64, last_phrase: String },
+}
+
+impl Display {
+    fn new() -> Self {
+        if !std::io::stderr().is_terminal() {
+            return Self::Lines { last_percent: u64::MAX, last_phrase: String::new() };
+        }
+        let bar = ProgressBar::new(1000);
+        if let Ok(style) = ProgressStyle::with_template("  {bar:32} {percent:>3} %  {elapsed:>4}  {wide_msg}")
+        {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(250));
+        Self::Bar(bar)
+    }
+
+    fn show(&mut self, progress: &Progress) {
+        let phrase = if progress.phrase.is_empty() { &progress.state } else { &progress.phrase };
+        match self {
+            Self::Bar(bar) => {
+                bar.set_position((progress.progress * 1000.0) as u64);
+                bar.set_message(phrase.clone());
+            }
+            Self::Lines { last_percent, last_phrase } => {
+                let percent = (progress.progress * 100.0) as u64;
+                if percent / 20 != *last_percent / 20 || (phrase != last_phrase && percent != *last_percent) {
+                    eprintln!("  {percent:>3} %  {phrase}");
+                    *last_percent = percent;
+                    last_phrase.clone_from(phrase);
+                }
+            }
+        }
+    }
+
+    fn close(self) {
+        if let Self::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
