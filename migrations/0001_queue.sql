@@ -38,7 +38,6 @@ CREATE TABLE runs (
     CONSTRAINT runs_started CHECK (state NOT IN ('running', 'succeeded') OR started_at IS NOT NULL),
     CONSTRAINT runs_succeeded_are_complete CHECK (state <> 'succeeded' OR progress = 1)
 );
-CREATE INDEX runs_by_project ON runs (project_id, created_at DESC, id);
 CREATE INDEX runs_by_session ON runs (session_id, created_at DESC) WHERE session_id IS NOT NULL;
 
 -- The unit of work. Ids rise in the order of enqueueing.

@@ -79,10 +79,16 @@ pub async fn complete(
     if lock_existing_run(&mut transaction, lease.run_id).await?.is_none() {
         return Ok(Settled::LeaseLost);
     }
-    let succeeded = fenced(include_str!("../queries/succeed_job.sql"), lease, &mut transaction).await?;
+    let (succeeded, unblocked): (bool, Vec<String>) =
+        sqlx::query_as(include_str!("../queries/succeed_job.sql"))
+            .bind(lease.job_id)
+            .bind(lease.lease_number)
+            .fetch_one(&mut *transaction)
+            .await?;
     if !succeeded {
         return refused(transaction, lease).await;
     }
+    channels::notify(&mut transaction, channels::AVAILABLE, unblocked.iter().map(String::as_str)).await?;
     insert_artefacts(&mut transaction, lease, completion.artefacts).await?;
     if !completion.children.is_empty() {
         enqueue_many(&mut transaction, lease.run_id, completion.children).await?;
@@ -90,10 +96,7 @@ pub async fn complete(
     if let Some(on_complete) = completion.on_complete {
         on_complete(&mut transaction).await.map_err(Error::OnComplete)?;
     }
-    unblock_dependents(&mut transaction, lease.job_id).await?;
-    if !succeed_run_if_done(&mut transaction, lease.run_id).await? {
-        update_run_progress(&mut transaction, &[lease.job_id]).await?;
-    }
+    settle_run(&mut transaction, lease).await?;
     transaction.commit().await?;
     Ok(Settled::Succeeded)
 }
@@ -291,35 +294,37 @@ async fn insert_artefacts(
     Ok(())
 }
 
-async fn unblock_dependents(connection: &mut PgConnection, job_id: JobId) -> Result<(), Error> {
-    let dependents: Vec<(String, String)> = sqlx::query_as(include_str!("../queries/unblock_dependents.sql"))
-        .bind(job_id)
-        .fetch_all(&mut *connection)
-        .await?;
-    let available = dependents.iter().filter(|(_, state)| state == JobState::Available.as_str());
-    channels::notify(connection, channels::AVAILABLE, available.map(|(kind, _)| kind.as_str())).await
+/// With the run locked: succeeds it if nothing is left to do, else brings its progress up to date.
+async fn settle_run(connection: &mut PgConnection, lease: &Lease) -> Result<(), Error> {
+    let left = is_anything_left(connection, lease.run_id).await?;
+    if !left.unfinished {
+        // Someone may be adding a job at this moment in a transaction that we cannot see.
+        sqlx::query(include_str!("../queries/lock_run_to_end.sql"))
+            .bind(lease.run_id)
+            .execute(&mut *connection)
+            .await?;
+        if !is_anything_left(connection, lease.run_id).await?.unfinished {
+            sqlx::query(include_str!("../queries/succeed_run.sql"))
+                .bind(lease.run_id)
+                .execute(&mut *connection)
+                .await?;
+            return channels::notify(connection, channels::RUNS, [lease.run_id.to_string().as_str()]).await;
+        }
+    }
+    if left.progress_due {
+        update_run_progress(connection, &[lease.job_id]).await?;
+    }
+    Ok(())
 }
 
-/// With the run locked: succeeds it if nothing is left to do.
-async fn succeed_run_if_done(connection: &mut PgConnection, run_id: RunId) -> Result<bool, Error> {
-    if has_unfinished_jobs(connection, run_id).await? {
-        return Ok(false);
-    }
-    // Someone may be adding a job at this moment in a transaction that we cannot see.
-    sqlx::query(include_str!("../queries/lock_run_to_end.sql"))
-        .bind(run_id)
-        .execute(&mut *connection)
-        .await?;
-    if has_unfinished_jobs(connection, run_id).await? {
-        return Ok(false);
-    }
-    sqlx::query(include_str!("../queries/succeed_run.sql")).bind(run_id).execute(&mut *connection).await?;
-    channels::notify(connection, channels::RUNS, [run_id.to_string().as_str()]).await?;
-    Ok(true)
+#[derive(sqlx::FromRow)]
+struct Left {
+    unfinished: bool,
+    progress_due: bool,
 }
 
-async fn has_unfinished_jobs(connection: &mut PgConnection, run_id: RunId) -> Result<bool, Error> {
-    Ok(sqlx::query_scalar(include_str!("../queries/has_unfinished_jobs.sql"))
+async fn is_anything_left(connection: &mut PgConnection, run_id: RunId) -> Result<Left, Error> {
+    Ok(sqlx::query_as(include_str!("../queries/is_anything_left.sql"))
         .bind(run_id)
         .fetch_one(connection)
         .await?)

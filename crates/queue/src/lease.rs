@@ -69,7 +69,6 @@ impl TryFrom<String> for BeatAnswer {
 pub(crate) async fn update_run_progress(connection: &mut PgConnection, jobs: &[JobId]) -> Result<(), Error> {
     let moved: Vec<String> = sqlx::query_scalar(include_str!("../queries/update_run_progress.sql"))
         .bind(jobs)
-        .bind(false)
         .fetch_all(&mut *connection)
         .await?;
     channels::notify(connection, channels::RUNS, moved.iter().map(String::as_str)).await

@@ -16,6 +16,9 @@ use super::link::{Link, Reconnect};
 use super::listener::listen;
 use crate::{ClaimedJob, Error, claim, is_any_available, reap};
 
+/// Between two claims of a busy worker, so that one claim fills several slots.
+const GATHER: Duration = Duration::from_millis(2);
+
 /// A claim that takes longer is tried again over a new connection.
 const CLAIM_LIMIT: Duration = Duration::from_secs(10);
 
@@ -60,6 +63,7 @@ async fn claim_until_shutdown(shared: &Arc<Shared>, attempts: &mut JoinSet<()>) 
                 shared.is_connected.store(true, Ordering::Relaxed);
                 start(shared, attempts, jobs, permits);
                 // Notifications coalesce: after a claim that found something, look again.
+                tokio::time::sleep(GATHER).await;
                 continue;
             }
             Ok(Taken::Contended) => Duration::from_millis(2),

@@ -1,6 +1,7 @@
 //! Keeps the leases: beats for all held jobs, sends their progress, hears of lost leases and cancels.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use tokio::time::Instant;
@@ -31,7 +32,7 @@ pub(super) async fn keep(shared: Arc<Shared>, done: CancellationToken) {
             }
             Err(error) => {
                 tracing::warn!(%error, jobs = held.len(), "heartbeat failed");
-                shared.heartbeat_interval.send_modify(|_| ());
+                shared.is_connected.store(false, Ordering::Relaxed);
                 Instant::now() + reconnect.next().min(interval)
             }
         };
@@ -69,7 +70,7 @@ async fn beat(
 ) -> Result<Duration, Error> {
     send(link, held, interval).await?;
     let staleness = link.run(limit(interval), async |connection| staleness(connection).await).await?;
-    shared.is_connected.store(true, std::sync::atomic::Ordering::Relaxed);
+    shared.is_connected.store(true, Ordering::Relaxed);
     Ok(heartbeat_interval(staleness))
 }
 

@@ -120,9 +120,9 @@ async fn one_bad_row_does_not_block_the_sweep() {
     assert_eq!(queue.claim("chunk", 9).await.len(), 5);
     // Nobody can write the first; someone holds the run of another for ever.
     queue
-        .execute(format!(
-            "CREATE FUNCTION refuse() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN RAISE 'bad row'; END $$;"
-        ))
+        .execute(
+            "CREATE FUNCTION refuse() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN RAISE 'bad row'; END $$;",
+        )
         .await
         .unwrap();
     queue

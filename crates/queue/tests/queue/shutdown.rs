@@ -12,9 +12,11 @@ async fn a_shutdown_lets_jobs_end_within_the_grace_and_claims_no_more() {
     let queue = Queue::new().await;
     let shutdown = CancellationToken::new();
     let seen = shutdown.clone();
+    let (started, mut starts) = tokio::sync::mpsc::channel(2);
     let handler = does("chunk", move |job| {
-        let seen = seen.clone();
+        let (seen, started) = (seen.clone(), started.clone());
         async move {
+            started.send(()).await.map_err(JobError::retry)?;
             seen.cancelled().await;
             assert!(!job.is_cancelled(), "a shutdown is not a cancel");
             Ok(Outcome::default())
@@ -22,7 +24,9 @@ async fn a_shutdown_lets_jobs_end_within_the_grace_and_claims_no_more() {
     });
     let (_, ids) = queue.run(&jobs("chunk", 3)).await;
     let worker = queue.worker().handler(handler).concurrency(2).start(shutdown.clone());
-    queue.wait_for_job(ids[1], "running").await;
+    for _ in 0..2 {
+        starts.recv().await.expect("both slots are filled");
+    }
     shutdown.cancel();
     worker.stopped().await;
     let mut states = Vec::new();
