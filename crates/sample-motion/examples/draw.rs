@@ -22,7 +22,8 @@ fn main() -> Result<()> {
         None => Model::bundled().clone(),
     };
     let motion = model.draw(action, seed.parse()?, &options)?;
-    let text = if out.ends_with(".amc") { formats::amc::write(&motion) } else { formats::bvh::write(&motion) };
+    let text =
+        if out.ends_with(".amc") { formats::amc::write(&motion) } else { formats::bvh::write(&motion) };
     fs::write(out, text).with_context(|| format!("{out} cannot be written"))?;
     if let Some(stem) = out.strip_suffix(".amc") {
         fs::write(format!("{stem}.asf"), formats::asf::write(motion.skeleton()))?;

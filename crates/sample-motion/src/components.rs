@@ -37,7 +37,9 @@ pub(crate) fn principal(
                 let share = eigen.eigenvectors[(i, k)];
                 component.iter_mut().zip(row).for_each(|(c, x)| *c += share * x);
             }
-            component.iter_mut().zip(importance).for_each(|(c, w)| *c /= w);
+            // A component may as well be its negative: rounding must not decide which.
+            let sign = component.iter().map(|c| c * c * c).sum::<f64>().signum();
+            component.iter_mut().zip(importance).for_each(|(c, w)| *c *= sign / w);
             component
         })
         .collect()

@@ -18,6 +18,8 @@ const MOST_FRAMES: usize = 1 << 20;
 const PERSONAL_SHARE: f64 = 0.6;
 /// Styles and variations farther out than this many deviations are not drawn.
 const MOST_DEVIATIONS: f64 = 2.0;
+/// Styles bend back from this many deviations on.
+const MOST_STYLE: f64 = 1.3;
 /// Durations between marks are kept within these, seconds.
 const DURATION_SECS: (f64, f64) = (0.05, 5.0);
 /// Time constant of the smoothing that hides the joints between events, frames.
@@ -74,13 +76,15 @@ impl Model {
     }
 }
 
-/// Scores of the style components: partly the subject's own, partly this trial's.
+/// Scores of the style components: partly the subject's own, partly this trial's. The sum is cut again: a few trials
+/// do not say how far a style may go.
 fn draw_style(components: usize, action: Action, subject: u64, trial: &mut Chance) -> Vec<f64> {
     let mut personal = Chance::new(Purpose::PersonalStyle, [action as u64, subject, 0]);
     (0..components)
         .map(|_| {
-            PERSONAL_SHARE.sqrt() * personal.normal_within(MOST_DEVIATIONS)
-                + (1.0 - PERSONAL_SHARE).sqrt() * trial.normal_within(MOST_DEVIATIONS)
+            let own = PERSONAL_SHARE.sqrt() * personal.normal_within(MOST_DEVIATIONS);
+            let score = own + (1.0 - PERSONAL_SHARE).sqrt() * trial.normal_within(MOST_DEVIATIONS);
+            bend_into(score, -MOST_STYLE, MOST_STYLE)
         })
         .collect()
 }
@@ -127,7 +131,12 @@ fn channels_at(movement: &Movement, numbers: &[f64], values: &mut [f64], phase: 
 }
 
 /// Cycle after cycle from a random phase; the numbers move smoothly from one cycle's to the next's.
-fn cyclic_rows(movement: &Movement, style: &[f64], frames: usize, chance: &mut Chance) -> Vec<[f64; CHANNELS]> {
+fn cyclic_rows(
+    movement: &Movement,
+    style: &[f64],
+    frames: usize,
+    chance: &mut Chance,
+) -> Vec<[f64; CHANNELS]> {
     let mut wander = Wander::new(movement, chance);
     let mut current = wander.numbers(movement, style);
     wander.step(movement, chance);
@@ -150,7 +159,12 @@ fn cyclic_rows(movement: &Movement, style: &[f64], frames: usize, chance: &mut C
 }
 
 /// Event after event, with pauses in which the end of one turns into the beginning of the next.
-fn event_rows(movements: &[&Movement], style: &[f64], frames: usize, chance: &mut Chance) -> Vec<[f64; CHANNELS]> {
+fn event_rows(
+    movements: &[&Movement],
+    style: &[f64],
+    frames: usize,
+    chance: &mut Chance,
+) -> Vec<[f64; CHANNELS]> {
     let mut wanders: Vec<Wander> = movements.iter().map(|m| Wander::new(m, chance)).collect();
     let mut rows: Vec<[f64; CHANNELS]> = Vec::with_capacity(frames);
     while rows.len() < frames {

@@ -147,7 +147,8 @@ impl Track {
             kinematics.update(x, &mut state);
             track.look(&state, landmarks, x[HEADING], leg_m, arm_m);
         }
-        let lowest: Vec<f64> = std::iter::zip(&track.balls[0], &track.balls[1]).map(|(l, r)| l.y.min(r.y)).collect();
+        let lowest: Vec<f64> =
+            std::iter::zip(&track.balls[0], &track.balls[1]).map(|(l, r)| l.y.min(r.y)).collect();
         track.floor_m = quantile(&lowest, 0.25);
         track.fill_rows(&coordinates, leg_m);
         track.fill_contacts();

@@ -135,7 +135,7 @@ impl Model {
             )));
         }
         crate::features::parametrisation(&skeleton, &self.references).map_err(|e| bad(e.to_string()))?;
-        if !(self.ball_m.abs() < 1.0) || !self.references.iter().all(|r| r.norm() < 10.0) {
+        if self.ball_m.abs() > 1.0 || self.references.iter().any(|r| r.norm() > 10.0) {
             return Err(bad("height of the feet or a reference rotation is out of range"));
         }
         for action in crate::Action::ALL {
@@ -159,18 +159,25 @@ fn check_shape(header: &MovementHeader) -> Result<()> {
         return fail("too many functions or components");
     }
     let rising = shape.phases.windows(2).all(|w| w[1] > w[0]);
-    if !(2..=16).contains(&shape.phases.len()) || !rising || shape.phases[0] != 0.0 || shape.phases.last() != Some(&1.0)
+    if !(2..=16).contains(&shape.phases.len())
+        || !rising
+        || shape.phases[0] != 0.0
+        || shape.phases.last() != Some(&1.0)
     {
         return fail("phases of the marks do not rise from 0 to 1");
     }
     let (shortest, longest) = shape.pause_secs;
-    if !(0.0..=1.0).contains(&shape.share) || !(0.0..=longest).contains(&shortest) || !(longest < 60.0) {
+    if !(0.0..=1.0).contains(&shape.share) || !(0.0..=longest).contains(&shortest) || longest > 60.0 {
         return fail("share or pauses out of range");
     }
-    if shape.persistence.len() != header.variation || !shape.persistence.iter().all(|p| (0.0..1.0).contains(p)) {
+    if shape.persistence.len() != header.variation
+        || !shape.persistence.iter().all(|p| (0.0..1.0).contains(p))
+    {
         return fail("persistence is not one number in [0, 1) for each component of variation");
     }
-    if shape.ranges.len() != CHANNELS || !shape.ranges.iter().all(|(l, h)| l <= h && l.abs().max(h.abs()) < 1e3) {
+    if shape.ranges.len() != CHANNELS
+        || !shape.ranges.iter().all(|(l, h)| l <= h && l.abs().max(h.abs()) < 1e3)
+    {
         return fail("ranges of the channels are missing or out of order");
     }
     Ok(())

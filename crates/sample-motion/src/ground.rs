@@ -7,7 +7,9 @@ use model::{Motion, Skeleton};
 use nalgebra::Vector3;
 
 use crate::draw::FRAME_RATE;
-use crate::features::{CHANNELS, CONTACT, DOFS, FORWARD, HEIGHT, Landmarks, SIDEWAYS, TILT, TURNING, parametrisation};
+use crate::features::{
+    CHANNELS, CONTACT, DOFS, FORWARD, HEIGHT, Landmarks, SIDEWAYS, TILT, TURNING, parametrisation,
+};
 use crate::movement::Model;
 use crate::signal::{smooth, smoothstep};
 use crate::{Error, Result};
@@ -89,7 +91,8 @@ fn steps(
     let mut steps = vec![Vector3::zeros(); rows.len()];
     for i in 1..rows.len() {
         let (sin, cos) = coordinates[i][HEADING].sin_cos();
-        let (forward, sideways) = (rows[i][FORWARD] * leg_m / FRAME_RATE, rows[i][SIDEWAYS] * leg_m / FRAME_RATE);
+        let (forward, sideways) =
+            (rows[i][FORWARD] * leg_m / FRAME_RATE, rows[i][SIDEWAYS] * leg_m / FRAME_RATE);
         let own = Vector3::new(forward * sin + sideways * cos, 0.0, forward * cos - sideways * sin);
         let weights = [0, 1].map(|side| firm[i - 1][side].min(firm[i][side]));
         let free = (1.0 - weights[0] - weights[1]).max(0.0);
@@ -113,11 +116,19 @@ fn lifts(balls: &[[Vector3<f64>; 2]], firm: &[[f64; 2]], ball_m: f64) -> Vec<f64
         let gap = [0, 1].map(|side| ball_m - b[side].y);
         let w = [0, 1].map(|side| f[side] * (gap[side] / 0.03).clamp(-4.0, 4.0).exp());
         let total = w[0] + w[1] + 1e-9;
-        weights.push(f[0].max(f[1]) + 1e-6);
+        weights.push(f[0].max(f[1]));
         wanted.push((w[0] * gap[0] + w[1] * gap[1]) / total);
     }
     let weighted: Vec<f64> = weights.iter().zip(&wanted).map(|(w, v)| w * v).collect();
-    std::iter::zip(smooth(&weighted, HEIGHT_SMOOTHING), smooth(&weights, HEIGHT_SMOOTHING))
-        .map(|(v, w)| v / w)
+    // Far from any standing frame, what is wanted within half a second decides, and then what is wanted on the whole.
+    let near = |signal: &[f64]| smooth(signal, HEIGHT_SMOOTHING);
+    let far = |signal: &[f64]| smooth(signal, 4.0 * HEIGHT_SMOOTHING);
+    let overall = weighted.iter().sum::<f64>() / weights.iter().sum::<f64>().max(1e-9);
+    let sums = std::iter::zip(near(&weighted), far(&weighted));
+    let totals = std::iter::zip(near(&weights), far(&weights));
+    std::iter::zip(sums, totals)
+        .map(|((near, far), (w_near, w_far))| {
+            (near + 0.01 * far + 1e-6 * overall) / (w_near + 0.01 * w_far + 1e-6)
+        })
         .collect()
 }

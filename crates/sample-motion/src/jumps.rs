@@ -23,13 +23,18 @@ pub(crate) fn jumps(track: &Track) -> Vec<Segment> {
     let last = track.rows.len().saturating_sub(1) as f64;
     let mut found = Vec::new();
     for (i, &(take_off, landing)) in flights.iter().enumerate() {
-        let stands = |frame: &usize| (0..2).all(|side| track.balls[side][*frame].y - track.floor_m < HELD_UP_M);
+        let stands =
+            |frame: &usize| (0..2).all(|side| track.balls[side][*frame].y - track.floor_m < HELD_UP_M);
         let earliest = i.checked_sub(1).map_or(0.0, |p| flights[p].1 + 0.3 * rate);
         let latest = flights.get(i + 1).map_or(last, |n| n.0 - 0.3 * rate);
         let begin = (take_off - BEFORE_SECS * rate).max(earliest);
         let end = (landing + AFTER_SECS * rate).min(latest);
         // A foot that is held up belongs to a hop before or after.
-        let begin = (begin.ceil() as usize..take_off as usize).rev().take_while(stands).last().map_or(take_off, |f| f as f64);
+        let begin = (begin.ceil() as usize..take_off as usize)
+            .rev()
+            .take_while(stands)
+            .last()
+            .map_or(take_off, |f| f as f64);
         let end = (landing as usize..=end as usize).take_while(stands).last().map_or(landing, |f| f as f64);
         if take_off - begin >= LEAST_SECS * rate && end - landing >= LEAST_SECS * rate {
             found.push(Segment { marks: vec![begin, take_off, landing, end], first_phase: 0.0 });

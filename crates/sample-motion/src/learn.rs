@@ -107,11 +107,18 @@ impl Model {
     /// [`Error::NoMotions`] without motions, [`Error::Skeleton`] if one is not on a CMU skeleton, and
     /// [`Error::TooFewSegments`] if an action's trials hold too few cycles or events.
     pub fn learn(motions: &[LabelledMotion]) -> Result<Self> {
+        let Some(first) = motions.first() else { return Err(Error::NoMotions) };
         let mut skeletons = BTreeMap::new();
         for m in motions {
+            if !m.motion.skeleton().same_structure(first.motion.skeleton()) {
+                let reason = format!("skeleton has not the joints and channels of that of {}", first.name);
+                return Err(Error::Skeleton { motion: m.name.clone(), reason });
+            }
             skeletons.entry(m.subject.clone()).or_insert_with(|| m.motion.skeleton().clone());
         }
         let body = Body::learn(&skeletons)?;
+        let find = Landmarks::find(first.motion.skeleton());
+        find.map_err(|reason| Error::Skeleton { motion: first.name.clone(), reason })?;
         let references = mean_rotations(&motions.iter().map(|m| &m.motion).collect::<Vec<_>>())?;
         let mut tracks = Vec::new();
         for m in motions {
@@ -172,7 +179,9 @@ fn learn_action(action: Action, tracks: &[&(&LabelledMotion, Track)]) -> Result<
 /// Segments that share a style: those of a trial, or of a block of a long boxing trial.
 fn group_name(motion: &LabelledMotion, segment: &Segment, frame_rate: f64) -> String {
     match motion.action {
-        Action::Boxing => format!("{} block {}", motion.name, (segment.marks[0] / frame_rate / BLOCK_SECS) as usize),
+        Action::Boxing => {
+            format!("{} block {}", motion.name, (segment.marks[0] / frame_rate / BLOCK_SECS) as usize)
+        }
         _ => motion.name.clone(),
     }
 }
@@ -210,12 +219,11 @@ fn assemble(parts: &[Part], ranges: &[(f64, f64)]) -> Vec<Movement> {
 
     let centred: Vec<Centred> = parts.iter().map(|part| Centred::new(part, &votes)).collect();
     // Styles of all movements at once: a group's deviations side by side, 0 where it lacks a movement.
-    let joint: Vec<Vec<f64>> = groups
-        .iter()
-        .map(|group| centred.iter().flat_map(|c| c.deviation(group)).collect())
-        .collect();
+    let joint: Vec<Vec<f64>> =
+        groups.iter().map(|group| centred.iter().flat_map(|c| c.deviation(group)).collect()).collect();
     let importance: Vec<f64> = parts.iter().flat_map(Part::importance).collect();
-    let styles = principal(&joint, &group_votes, &importance, MOST_STYLES.min(groups.len() / GROUPS_PER_STYLE));
+    let styles =
+        principal(&joint, &group_votes, &importance, MOST_STYLES.min(groups.len() / GROUPS_PER_STYLE));
 
     let mut from = 0;
     std::iter::zip(parts, &centred)
@@ -300,7 +308,8 @@ impl Centred {
         let mut previous: Option<&str> = None;
         for o in part.observations.iter().filter(|o| sizes[o.group.as_str()] > 1.0) {
             let n = sizes[o.group.as_str()];
-            residuals.push(o.numbers.iter().zip(&self.groups[&o.group]).map(|(v, m)| v - m).collect::<Vec<_>>());
+            residuals
+                .push(o.numbers.iter().zip(&self.groups[&o.group]).map(|(v, m)| v - m).collect::<Vec<_>>());
             // n residuals about their own mean know only n - 1 deviations.
             votes.push(n / (n - 1.0));
             follows.push(previous == Some(&o.group));

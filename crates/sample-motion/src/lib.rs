@@ -25,10 +25,10 @@ mod features;
 mod file;
 mod gait;
 mod ground;
+mod jumps;
 mod learn;
 mod movement;
 mod punches;
-mod jumps;
 mod segment;
 mod signal;
 

@@ -113,7 +113,8 @@ pub struct MovementSummary {
 
 static BUNDLED: LazyLock<Model> = LazyLock::new(|| {
     // A test draws from it, so a build whose file does not read cannot pass.
-    Model::from_bytes(include_bytes!("../data/cmu.motion-model")).expect("the bundled model is read by its tests")
+    Model::from_bytes(include_bytes!("../data/cmu.motion-model"))
+        .expect("the bundled model is read by its tests")
 });
 
 impl Model {

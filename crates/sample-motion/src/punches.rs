@@ -54,7 +54,9 @@ fn peaks(track: &Track, side: usize) -> Vec<usize> {
             let (from, to) = (i.saturating_sub(window), (i + window + 1).min(reach.len()));
             let near = i.saturating_sub(window / 3)..(i + window / 3 + 1).min(reach.len());
             let is_highest = near.clone().all(|k| reach[k] < reach[i] || (reach[k] == reach[i] && k >= i));
-            is_highest && reach[i] - lowest(from..i) > LEAST_RISE && reach[i] - lowest(i..to) > LEAST_RISE * 0.8
+            is_highest
+                && reach[i] - lowest(from..i) > LEAST_RISE
+                && reach[i] - lowest(i..to) > LEAST_RISE * 0.8
         })
         .collect()
 }

@@ -40,23 +40,25 @@ pub(crate) fn describe(track: &Track, segment: &Segment, basis: Basis, phases: &
     let mut numbers: Vec<f64> = segment.durations(track.frame_rate).map(f64::ln).collect();
     let (begin, end) = (segment.marks[0], segment.marks[segment.marks.len() - 1]);
     let (first, last) = (row_at(track, begin), row_at(track, end));
-    let mut samples = vec![[0.0; SAMPLES]; CHANNELS];
-    for s in 0..SAMPLES {
-        let phase = basis.sample_phase(s);
-        let phase = if segment.first_phase > 0.0 { (phase + 1.0 - segment.first_phase).fract() } else { phase };
+    let sample = |s: usize| {
+        let own_phase = basis.sample_phase(s);
+        let phase = match segment.first_phase {
+            0.0 => own_phase,
+            first => (own_phase + 1.0 - first).fract(),
+        };
         let row = row_at(track, piecewise(phase, phases, &segment.marks));
-        for channel in 0..CHANNELS {
-            // A cycle ends where it began: what is left over is spread evenly.
-            let drift = match basis {
-                Basis::Cycle { .. } => (phase - 0.5) * (last[channel] - first[channel]),
-                Basis::Once { .. } => 0.0,
-            };
-            samples[channel][s] = row[channel] - drift;
-        }
-    }
+        // A cycle ends where it began: what is left over is spread evenly.
+        let spread = match basis {
+            Basis::Cycle { .. } => phase - 0.5,
+            Basis::Once { .. } => 0.0,
+        };
+        std::array::from_fn(|channel| row[channel] - spread * (last[channel] - first[channel]))
+    };
+    let samples: Vec<[f64; CHANNELS]> = (0..SAMPLES).map(sample).collect();
     let mut coefficients = vec![0.0; basis.len()];
-    for channel in &samples {
-        basis.fit(channel, &mut coefficients);
+    for channel in 0..CHANNELS {
+        let of_channel: Vec<f64> = samples.iter().map(|row| row[channel]).collect();
+        basis.fit(&of_channel, &mut coefficients);
         numbers.extend_from_slice(&coefficients);
     }
     numbers
@@ -98,7 +100,8 @@ mod tests {
 
     #[test]
     fn zeros_of_a_sine_are_one_period_apart() {
-        let signal: Vec<f64> = (0..200).map(|i| (i as f64 * std::f64::consts::TAU / 40.0 - 0.3).sin()).collect();
+        let signal: Vec<f64> =
+            (0..200).map(|i| (i as f64 * std::f64::consts::TAU / 40.0 - 0.3).sin()).collect();
         let zeros = rising_zeros(&signal, 0.3);
         assert!(zeros.len() >= 4, "{zeros:?}");
         assert!(zeros.windows(2).all(|w| (w[1] - w[0] - 40.0).abs() < 0.05), "{zeros:?}");

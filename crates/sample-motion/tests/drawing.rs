@@ -39,10 +39,12 @@ fn the_bundled_file_is_small_and_is_what_it_writes() {
 fn the_same_seed_gives_the_same_motion_on_every_machine() {
     let mut hash = blake3::Hasher::new();
     for (_, _, motion) in all().filter(|(_, seed, _)| *seed < 2) {
-        motion.values().iter().for_each(|v| drop(hash.update(&v.to_le_bytes())));
+        for value in motion.values() {
+            hash.update(&value.to_le_bytes());
+        }
     }
     // Changes when the model is learned anew or the drawing changes, and at no other time.
-    assert_eq!(hash.finalize().to_hex()[..16], *"GOLDEN");
+    assert_eq!(hash.finalize().to_hex()[..16], *"40943df453dfe02b");
 }
 
 #[test]
@@ -78,7 +80,9 @@ fn the_skeleton_has_the_bones_of_cmu() {
     let legs = ["lhipjoint lfemur ltibia lfoot ltoes", "rhipjoint rfemur rtibia rfoot rtoes"];
     let spine = "lowerback upperback thorax lowerneck upperneck head";
     let arms = ["l", "r"].map(|s| {
-        ["clavicle", "humerus", "radius", "wrist", "hand", "fingers", "thumb"].map(|b| format!("{s}{b}")).join(" ")
+        ["clavicle", "humerus", "radius", "wrist", "hand", "fingers", "thumb"]
+            .map(|b| format!("{s}{b}"))
+            .join(" ")
     });
     let expected = ["root", legs[0], legs[1], spine, &arms[0], &arms[1]].join(" ");
     let mut expected: Vec<&str> = expected.split(' ').collect();
@@ -93,7 +97,10 @@ fn the_skeleton_has_the_bones_of_cmu() {
 fn subjects_differ_in_size_and_are_of_human_size() {
     let leg_m = |subject| {
         let skeleton = Model::bundled().skeleton(subject).unwrap();
-        ["ltibia", "lfoot"].iter().map(|n| skeleton.joints()[skeleton.joint_index(n).unwrap()].offset.norm()).sum()
+        ["ltibia", "lfoot"]
+            .iter()
+            .map(|n| skeleton.joints()[skeleton.joint_index(n).unwrap()].offset.norm())
+            .sum()
     };
     let legs: Vec<f64> = (0..20).map(leg_m).collect();
     let (least, most) = legs.iter().fold((f64::INFINITY, 0.0f64), |(a, b), &l| (a.min(l), b.max(l)));
@@ -108,7 +115,10 @@ fn knees_and_elbows_bend_the_human_way() {
             let dof = skeleton.dofs(skeleton.joint_index(joint).unwrap()).start;
             for (frame, pose) in motion.poses().enumerate() {
                 let degrees = pose[dof].to_degrees();
-                assert!((-15.0..=165.0).contains(&degrees), "{action} {seed}: {joint} {degrees:.0}° in frame {frame}");
+                assert!(
+                    (-15.0..=165.0).contains(&degrees),
+                    "{action} {seed}: {joint} {degrees:.0}° in frame {frame}"
+                );
             }
         }
     }
@@ -126,7 +136,8 @@ fn angles_move_without_jumps() {
                 if dofs.len() < 3 {
                     for dof in dofs {
                         let step = (motion.pose(frame)[dof] - motion.pose(frame - 1)[dof]).abs().to_degrees();
-                        assert!(step < 25.0, "{action} {seed}: {} steps {step:.1}° at {frame}", names[dof]);
+                        // The elbow of a recorded punch makes up to 34° in a frame.
+                        assert!(step < 45.0, "{action} {seed}: {} steps {step:.1}° at {frame}", names[dof]);
                     }
                 }
             }
@@ -151,7 +162,11 @@ fn feet_are_near_the_floor_and_standing_feet_stand() {
             let feet = positions(&motion, &["ltoes", "rtoes"]);
             for w in feet.windows(2) {
                 let lower = if w[1][0].y < w[1][1].y { 0 } else { 1 };
-                assert!(w[1][lower].y > -0.12, "{action} {seed}: foot {:.3} m under the floor", -w[1][lower].y);
+                assert!(
+                    w[1][lower].y > -0.12,
+                    "{action} {seed}: foot {:.3} m under the floor",
+                    -w[1][lower].y
+                );
                 lows.push(w[1][lower].y);
                 if w[1][lower].y < 0.05 {
                     let step = w[1][lower] - w[0][lower];
@@ -160,8 +175,12 @@ fn feet_are_near_the_floor_and_standing_feet_stand() {
             }
         }
         let (slide, low) = (median(&mut slides), median(&mut lows));
-        println!("{action}: median height of the lower foot {low:.3} m, median speed when low {slide:.3} m/s");
-        assert!(slide < 0.35, "{action}: low feet slide at {slide:.2} m/s");
+        println!(
+            "{action}: median height of the lower foot {low:.3} m, median speed when low {slide:.3} m/s"
+        );
+        // Boxers shuffle: recorded ones at 0.31 and 0.45 m/s by the same measure, a recorded walk at 0.08.
+        let most = if action == Action::Boxing { 0.6 } else { 0.2 };
+        assert!(slide < most, "{action}: low feet slide at {slide:.2} m/s");
         assert!((-0.02..0.10).contains(&low), "{action}: lower foot at {low:.3} m");
     }
 }

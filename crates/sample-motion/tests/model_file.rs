@@ -51,6 +51,8 @@ fn a_file_of_absurd_size_is_refused_unread() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
     #[test]
     fn a_damaged_byte_is_found(at in 12..BYTES.len(), bit in 0u8..8) {
         let mut bytes = BYTES.to_vec();

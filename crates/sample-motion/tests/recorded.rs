@@ -13,7 +13,8 @@ fn recorded(folder: &Path, wanted: impl Fn(&str) -> bool) -> Vec<LabelledMotion>
     rows.map(|row| {
         let (name, subject) = (row.get("trial").to_owned(), row.get("subject").to_owned());
         let skeleton = asf::read(&testdata::read(folder, &format!("{subject}.asf"))).unwrap().value;
-        let motion = amc::read(&testdata::read(folder, &format!("{name}.amc")), &skeleton, 120.0).unwrap().value;
+        let motion =
+            amc::read(&testdata::read(folder, &format!("{name}.amc")), &skeleton, 120.0).unwrap().value;
         LabelledMotion { name, subject, action: row.get("action").parse().unwrap(), motion }
     })
     .collect()
@@ -42,7 +43,8 @@ fn postures(motion: &Motion) -> Vec<Vec<f64>> {
 /// How far the postures of one motion are from the nearest of another, RMS over joints, mean over frames, degrees.
 fn distance(from: &[Vec<f64>], to: &[Vec<f64>]) -> f64 {
     let nearest = |p: &Vec<f64>| {
-        let squares = to.iter().map(|q| p.iter().zip(q).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / p.len() as f64);
+        let squares =
+            to.iter().map(|q| p.iter().zip(q).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / p.len() as f64);
         squares.fold(f64::INFINITY, f64::min).sqrt()
     };
     (from.iter().map(nearest).sum::<f64>() / from.len() as f64).to_degrees()
@@ -67,23 +69,31 @@ fn drawn_trials_are_as_far_from_recorded_ones_as_those_from_each_other() {
         }
         let (mut to_any, mut to_stranger) = (Vec::new(), Vec::new());
         for (i, (subject, from)) in postures_of.iter().enumerate() {
-            let others: Vec<_> = postures_of.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, o)| o).collect();
+            let others: Vec<_> =
+                postures_of.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, o)| o).collect();
             let strangers: Vec<_> = others.iter().filter(|o| o.0 != *subject).map(|o| &o.1).collect();
             to_any.push(nearest(from, &others.iter().map(|o| &o.1).collect::<Vec<_>>()));
             to_stranger.push(nearest(from, &strangers));
         }
         let real: Vec<_> = postures_of.iter().map(|p| &p.1).collect();
         let drawn: Vec<_> = (0..16)
-            .map(|seed| postures(&Model::bundled().draw(action, seed, &DrawOptions { frames: 240, subject: seed % 8 }).unwrap()))
+            .map(|seed| {
+                postures(
+                    &Model::bundled()
+                        .draw(action, seed, &DrawOptions { frames: 240, subject: seed % 8 })
+                        .unwrap(),
+                )
+            })
             .collect();
         let mut to_real: Vec<f64> = drawn.iter().map(|d| nearest(d, &real)).collect();
         let mut to_drawn: Vec<f64> = (0..drawn.len())
             .map(|i| {
-                let others: Vec<_> = drawn.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, d)| d).collect();
+                let others: Vec<_> =
+                    drawn.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, d)| d).collect();
                 nearest(&drawn[i], &others)
             })
             .collect();
-        let mut show = |what: &str, values: &mut Vec<f64>| {
+        let show = |what: &str, values: &mut Vec<f64>| {
             values.sort_by(f64::total_cmp);
             let (least, most) = (values[0], values[values.len() - 1]);
             println!("{action}: {what}: {least:.1} … {:.1} … {most:.1}°", values[values.len() / 2]);
@@ -93,8 +103,14 @@ fn drawn_trials_are_as_far_from_recorded_ones_as_those_from_each_other() {
         show("drawn to nearest recorded", &mut to_real);
         show("drawn to nearest drawn", &mut to_drawn);
         let median = |values: &[f64]| values[values.len() / 2];
-        assert!(to_real[0] >= to_any[0], "{action}: a drawn trial is nearer to a recorded one than recorded ones are");
-        assert!(median(&to_real) <= 1.5 * median(&to_stranger), "{action}: drawn trials are too far from recorded ones");
+        assert!(
+            to_real[0] >= to_any[0],
+            "{action}: a drawn trial is nearer to a recorded one than recorded ones are"
+        );
+        assert!(
+            median(&to_real) <= 1.5 * median(&to_stranger),
+            "{action}: drawn trials are too far from recorded ones"
+        );
         assert!(median(&to_drawn) >= to_any[0], "{action}: drawn trials hardly differ");
     }
 }
@@ -109,7 +125,8 @@ fn learning_from_the_recorded_trials_gives_the_bundled_model() {
     assert_eq!(learned.summary(), Model::bundled().summary());
     let options = DrawOptions { frames: 60, subject: 0 };
     for action in Action::ALL {
-        let (a, b) = (learned.draw(action, 0, &options).unwrap(), Model::bundled().draw(action, 0, &options).unwrap());
+        let (a, b) =
+            (learned.draw(action, 0, &options).unwrap(), Model::bundled().draw(action, 0, &options).unwrap());
         let farthest = a.values().iter().zip(b.values()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(farthest < 1e-3, "{action}: differs by {farthest}");
     }
@@ -126,4 +143,34 @@ fn a_model_needs_enough_motion() {
     let error = Model::learn(&[short]).unwrap_err();
     assert!(error.to_string().contains("punch in 1 motions"), "{error}");
     assert_eq!(Model::learn(&[]).unwrap_err(), sample_motion::Error::NoMotions);
+}
+
+#[test]
+fn a_skeleton_that_is_not_of_cmu_is_refused_by_name() {
+    let root = model::Joint::root("hips", vec![model::Channel::translation(model::Axis::Y)]);
+    let skeleton = model::Skeleton::new("stick", vec![root]).unwrap();
+    let motion = Motion::new(skeleton.into(), 60.0, vec![0.0; 100]).unwrap();
+    let stick =
+        LabelledMotion { name: "stick_01".into(), subject: "stick".into(), action: Action::Walk, motion };
+    let error = Model::learn(std::slice::from_ref(&stick)).unwrap_err().to_string();
+    assert_eq!(error, "motion stick_01: skeleton has 1 DOFs, expected 62");
+    let walk = Model::bundled().draw(Action::Walk, 0, &DrawOptions::default()).unwrap();
+    let drawn =
+        LabelledMotion { name: "drawn".into(), subject: "s".into(), action: Action::Walk, motion: walk };
+    let error = Model::learn(&[drawn, stick]).unwrap_err().to_string();
+    assert!(error.starts_with("motion stick_01: skeleton has not the joints"), "{error}");
+}
+
+#[test]
+fn a_model_can_be_learned_from_drawn_motion() {
+    let draw = |seed| {
+        let motion = Model::bundled().draw(Action::Walk, seed, &DrawOptions { frames: 360, subject: seed });
+        let (name, subject) = (format!("drawn {seed}"), format!("{seed}"));
+        LabelledMotion { name, subject, action: Action::Walk, motion: motion.unwrap() }
+    };
+    let model = Model::learn(&(0..6).map(draw).collect::<Vec<_>>()).unwrap();
+    let again = model.draw(Action::Walk, 1, &DrawOptions::default()).unwrap();
+    let from = postures(&Model::bundled().draw(Action::Walk, 1, &DrawOptions::default()).unwrap());
+    assert!(distance(&postures(&again), &from) < 8.0);
+    assert!(model.draw(Action::Run, 1, &DrawOptions::default()).is_err());
 }
