@@ -1,0 +1,64 @@
+//! Motion files of folders, as clips.
+
+use std::{
+    collections::HashSet,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, bail};
+use formats::{
+    archive::{self, Entry, Limits},
+    motion_files::{self, Options},
+};
+use motion_db::Clip;
+
+use crate::pack::is_motion_file;
+
+/// Reads the motions of folders (ASF+AMC or BVH, also `.zst` or `.gz`), in the order of their names.
+pub fn read(folders: &[PathBuf]) -> anyhow::Result<Vec<Clip>> {
+    let mut clips: Vec<Clip> = Vec::new();
+    let mut names = HashSet::new();
+    for folder in folders {
+        let mut files = Vec::new();
+        collect(folder, &mut files)?;
+        if files.is_empty() {
+            bail!("found no .asf, .amc or .bvh file in {}", folder.display());
+        }
+        files.sort();
+        let mut entries: Vec<Entry> = Vec::new();
+        for file in &files {
+            let bytes = fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
+            let name = file.strip_prefix(folder).unwrap_or(file).to_string_lossy();
+            entries.extend(archive::entries(&name, &bytes, &Limits::default())?);
+        }
+        let read = motion_files::clips(&entries, &Options::default())
+            .with_context(|| format!("cannot read the motions of {}", folder.display()))?;
+        for warning in &read.warnings {
+            eprintln!("warning: {warning}");
+        }
+        // The same trial in two folders is one trial.
+        let new = read.value.into_iter().filter(|file| names.insert(file.name.clone()));
+        clips.extend(new.map(|file| Clip {
+            name: file.name,
+            subject: file.subject,
+            action: file.action,
+            motion: file.motion,
+        }));
+    }
+    clips.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(clips)
+}
+
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> anyhow::Result<()> {
+    let entries = fs::read_dir(folder).with_context(|| format!("cannot read folder {}", folder.display()))?;
+    for entry in entries {
+        let path = entry?.path();
+        if path.is_dir() {
+            collect(&path, files)?;
+        } else if path.file_name().is_some_and(|name| is_motion_file(&name.to_string_lossy())) {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
