@@ -170,7 +170,7 @@ impl Drop for System {
         let Some(runtime) = self.runtime.take() else { return };
         let (gateway, services) = (self.gateway.take(), std::mem::take(&mut self.services));
         // A test that failed has other things to tell than how its system ended.
-        let _ = runtime.block_on(tokio::time::timeout(Duration::from_secs(20), async {
+        let ended = async {
             if let Some(gateway) = gateway {
                 gateway.stopped().await?;
             }
@@ -178,7 +178,8 @@ impl Drop for System {
                 service.stopped().await?;
             }
             anyhow::Ok(())
-        }));
+        };
+        let _ = runtime.block_on(async { tokio::time::timeout(Duration::from_secs(20), ended).await });
         runtime.shutdown_background();
     }
 }

@@ -24,7 +24,7 @@ use crate::{
 /// Where the demo keeps its things.
 const FOLDER: &str = ".marey/demo";
 /// Trials that are drawn when there is no data.
-const NUM_SAMPLES: u32 = 40;
+const NUM_SAMPLES: u32 = 120;
 /// Trials that are held out and reconstructed.
 const NUM_HELD_OUT: usize = 2;
 /// Control points of the sessions.
@@ -145,25 +145,19 @@ fn show(client: &Client, data: Option<&Path>, folder: &Path) -> anyhow::Result<(
     Ok(())
 }
 
-/// Takes to be reconstructed and takes to learn from, of performers who have both.
+/// Takes to be reconstructed and takes to learn from, of performers who have both; the same every time.
 fn hold_out(takes: &[Take]) -> anyhow::Result<(Vec<Take>, Vec<Take>)> {
-    let performer = |take: &Take| take.name.split('_').next().unwrap_or_default().to_owned();
-    let mut held_out: Vec<Take> = Vec::new();
-    // the last of every second performer: spread over what there is, the same every time
-    let candidates: Vec<&Take> = takes
-        .iter()
-        .enumerate()
-        .filter(|(i, take)| {
-            let is_last = takes.get(i + 1).is_none_or(|next| performer(next) != performer(take));
-            is_last && takes.iter().filter(|other| performer(other) == performer(take)).count() > 2
-        })
-        .map(|(_, take)| take)
-        .collect();
-    let stride = (candidates.len() / NUM_HELD_OUT).max(1);
-    held_out.extend(candidates.into_iter().step_by(stride).take(NUM_HELD_OUT).cloned());
-    if held_out.is_empty() && takes.len() > 2 {
-        held_out.extend(takes.last().cloned());
+    let mut performers: Vec<&[Take]> =
+        takes.chunk_by(|a, b| a.performer() == b.performer()).filter(|of_one| of_one.len() > 2).collect();
+    if performers.is_empty() && takes.len() > 2 {
+        performers.push(takes);
     }
+    let stride = (performers.len() / NUM_HELD_OUT).max(1);
+    let chosen = performers.into_iter().step_by(stride).take(NUM_HELD_OUT).enumerate();
+    // not each performer's last: where actions come in turn, these would be of one kind
+    let held_out: Vec<Take> = chosen
+        .map(|(i, of_one)| of_one[(of_one.len() + i).saturating_sub(4) % of_one.len()].clone())
+        .collect();
     if held_out.is_empty() {
         bail!("found {} trials (ASF with AMC, or BVH), expected at least 3", takes.len());
     }

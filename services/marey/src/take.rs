@@ -67,6 +67,11 @@ impl Take {
         Ok(takes)
     }
 
+    /// The name up to `_`: whose take it is.
+    pub fn performer(&self) -> &str {
+        self.name.split('_').next().unwrap_or_default()
+    }
+
     /// Reads it.
     pub fn read(&self) -> anyhow::Result<Recording> {
         let motion = unpacked(&self.motion)?;

@@ -48,7 +48,7 @@ pub struct Args {
 /// Runs `marey up` until SIGTERM or SIGINT.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut telemetry = TelemetryConfig::from_variables(&Variables::new(&environment))?;
-    telemetry.filter.get_or_insert_with(|| "warn".into());
+    telemetry.filter.get_or_insert_with(|| "warn,sqlx=error".into());
     service::telemetry::start(&telemetry)?;
     runtime()?.block_on(async {
         let shutdown = service::shutdown::on_signal()?;
