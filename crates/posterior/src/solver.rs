@@ -14,7 +14,7 @@ pub struct SolverParameters {
 
 impl Default for SolverParameters {
     fn default() -> Self {
-        Self { max_steps: 12, relative_decrease: 1e-6 }
+        Self { max_steps: 12, relative_decrease: 1e-4 }
     }
 }
 

@@ -13,6 +13,17 @@ const MAGIC: &[u8; 8] = b"MAREYREC";
 /// Numbers a frame's quality is written as.
 const QUALITY_NUMBERS: usize = 5;
 
+/// Start poses that are run over all of the frames on which they are compared.
+const FINALISTS: usize = 3;
+
+/// A start pose on trial.
+struct Probe {
+    start: Track,
+    now: Track,
+    /// minus the log of the probability it gave to what was measured since
+    surprise: f64,
+}
+
 /// How well a frame is known.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FrameQuality {
@@ -230,18 +241,19 @@ impl<'a> Reconstructor<'a> {
             &self.exclude_poses,
             self.parameters.start_candidates,
         );
-        let mut best: Option<(f64, Track)> = None;
-        let begun: Vec<Track> = starts.iter().map(|s| tracker.track_from(s)).chain(current).collect();
-        for track in begun {
-            let mut probe = track.clone();
-            let mut surprise = 0.0;
-            for f in first..first + ahead {
-                surprise += tracker.step(&mut probe, trajectories.frame(f)).solution.surprise();
+        let begun = starts.iter().map(|s| tracker.track_from(s)).chain(current);
+        let mut probes: Vec<Probe> =
+            begun.map(|start| Probe { now: start.clone(), start, surprise: 0.0 }).collect();
+        // All run a third of the way, the best few to the end.
+        for (part, keep) in [(first..first + ahead / 3, FINALISTS), (first + ahead / 3..first + ahead, 1)] {
+            for probe in &mut probes {
+                for f in part.clone() {
+                    probe.surprise += tracker.step(&mut probe.now, trajectories.frame(f)).solution.surprise();
+                }
             }
-            if best.as_ref().is_none_or(|(least, _)| surprise < *least) {
-                best = Some((surprise, track));
-            }
+            probes.sort_by(|a, b| a.surprise.total_cmp(&b.surprise));
+            probes.truncate(keep);
         }
-        best.map(|(_, track)| track).ok_or(Error::NoStart { frame })
+        probes.into_iter().next().map(|probe| probe.start).ok_or(Error::NoStart { frame })
     }
 }
