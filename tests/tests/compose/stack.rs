@@ -1,8 +1,9 @@
 //! The running stack: how many replicas of a service there are, and what happens to them.
 
-use crate::client::Client;
-use anyhow::{Context, Result, ensure};
 use std::{env, process::Command};
+
+use anyhow::{Context, Result, ensure};
+use tests::Api;
 
 pub struct Stack {
     /// `docker compose --project-name … --file …`, word by word
@@ -10,31 +11,20 @@ pub struct Stack {
 }
 
 impl Stack {
-    /// The stack that `scripts/test-compose.sh` brought up, and a client of its gateway.
-    pub fn from_environment() -> Option<(Self, Client)> {
+    /// The stack that `scripts/test-compose.sh` brought up, and a caller of its gateway.
+    pub fn from_environment() -> Option<(Self, Api)> {
         let url = env::var("MAREY_COMPOSE_URL").ok()?;
-        let key = env::var("MAREY_COMPOSE_KEY").expect("MAREY_COMPOSE_KEY goes with MAREY_COMPOSE_URL");
-        let compose =
-            env::var("MAREY_COMPOSE_COMMAND").expect("MAREY_COMPOSE_COMMAND goes with MAREY_COMPOSE_URL");
-        let compose = compose.split_whitespace().map(str::to_owned).collect();
-        Some((Self { compose }, Client::new(&url, &key)))
+        let variable =
+            |name: &str| env::var(name).unwrap_or_else(|_| panic!("{name} goes with MAREY_COMPOSE_URL"));
+        let compose = variable("MAREY_COMPOSE_COMMAND").split_whitespace().map(str::to_owned).collect();
+        Some((Self { compose }, Api::new(&url, &variable("MAREY_COMPOSE_KEY"))))
     }
 
-    /// Brings `service` to `replicas` replicas; ones that were killed are started again.
+    /// Brings `service` to so many replicas; ones that were killed are started again.
     pub fn scale(&self, service: &str, replicas: usize) -> Result<()> {
         let scale = format!("{service}={replicas}");
-        let mut command = Command::new(&self.compose[0]);
-        command.args(&self.compose[1..]);
-        run(command.args([
-            "up",
-            "--detach",
-            "--no-build",
-            "--no-deps",
-            "--no-recreate",
-            "--scale",
-            &scale,
-            service,
-        ]))
+        let up = ["up", "--detach", "--no-build", "--no-deps", "--no-recreate", "--scale", &scale, service];
+        run(Command::new(&self.compose[0]).args(&self.compose[1..]).args(up))
     }
 
     /// Runs a command of the Docker client.
@@ -50,7 +40,7 @@ pub fn container_of(worker: &str) -> Result<String> {
 }
 
 fn run(command: &mut Command) -> Result<()> {
-    // compose paths are relative to the repository
+    // the paths of the compose command are relative to the repository
     let command = command.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     let output = command.output().with_context(|| format!("{command:?}"))?;
     ensure!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
