@@ -42,7 +42,8 @@ async fn is_ready(pool: &PgPool) -> bool {
     matches!(tokio::time::timeout(ANSWER_WITHIN, database::is_reachable(pool)).await, Ok(Ok(())))
 }
 
-async fn report(reporter: &HealthReporter, names: &[&'static str], is_ready: bool) {
+/// Says of `names`, and of the server as a whole (`""`), whether they are ready.
+pub async fn report(reporter: &HealthReporter, names: &[&'static str], is_ready: bool) {
     let status = if is_ready { ServingStatus::Serving } else { ServingStatus::NotServing };
     for name in names.iter().copied().chain([""]) {
         reporter.set_service_status(name, status).await;

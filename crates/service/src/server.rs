@@ -64,6 +64,8 @@ where
     let listener = TcpListener::bind(at).await.map_err(refuse)?;
     let address = listener.local_addr().map_err(refuse)?;
     let (reporter, health_service) = tonic_health::server::health_reporter();
+    // Whoever asks before the database was looked at must hear that the service is known and not ready.
+    health::report(&reporter, parts.grpc_names, false).await;
     let reflection = tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(parts.descriptors)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)

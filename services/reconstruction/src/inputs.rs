@@ -10,7 +10,7 @@ use std::{
     sync::Arc,
 };
 
-/// Frame rate of an AMC (which does not say it) when nothing else fits: CMU's, Hz.
+/// Frame rate of an AMC that does not state it when nothing else fits: CMU's, Hz.
 const AMC_FRAME_RATE: f64 = 120.0;
 
 /// A file's content.
@@ -100,7 +100,7 @@ pub(crate) fn read(
 }
 
 /// The motion that really was, if a file has it; `seconds`: how long the session is, from which the frame rate of an AMC
-/// is guessed.
+/// that does not state it is guessed.
 ///
 /// # Errors
 /// If the file can't be read.
@@ -119,7 +119,8 @@ pub(crate) fn ground_truth(
                 None => asf::File { skeleton: fallback.clone(), metres_per_unit: asf::CMU_METRES_PER_UNIT },
             };
             let read = formats::amc::read(&file.bytes, &acclaim, AMC_FRAME_RATE).map_err(in_file)?;
-            let rate = amc_frame_rate(read.value.num_frames(), seconds);
+            let stated = formats::amc::stated_frame_rate(&file.bytes);
+            let rate = stated.unwrap_or_else(|| amc_frame_rate(read.value.num_frames(), seconds));
             let motion = Motion::new(acclaim.skeleton, rate, read.value.values().to_vec())
                 .map_err(|e| in_file(e.into()))?;
             Read { value: motion, warnings: read.warnings }

@@ -13,6 +13,8 @@ use tonic::{Request, Response, Status};
 use uuid::Uuid;
 
 const MAX_FRAMES: usize = 600;
+/// Longest request; the answer to it has 1,200 frames and stays below gRPC's usual limit of 4 MB a message.
+const MAX_SECONDS: f64 = 20.0;
 const DEFAULT_FRAME_RATE: f64 = 60.0;
 /// Rates outside would make very many frames of few, or none, Hz.
 const FRAME_RATES: std::ops::RangeInclusive<f64> = 10.0..=10_000.0;
@@ -38,6 +40,10 @@ impl Rpc {
         let rate = if request.frame_rate_hz == 0.0 { DEFAULT_FRAME_RATE } else { request.frame_rate_hz };
         if !FRAME_RATES.contains(&rate) {
             return Err(out_of_range("frame_rate_hz", rate, "10 to 10000").into());
+        }
+        let seconds = frames as f64 / rate;
+        if seconds > MAX_SECONDS {
+            return Err(out_of_range("length of the frames in seconds", seconds, "at most 20").into());
         }
         let trajectories = proto::points::trajectories(&request.frames, rate)?;
         let file = self.find(id).await?;

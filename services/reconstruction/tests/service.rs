@@ -149,6 +149,14 @@ impl Fixture {
         results.into_iter().map(|artefact| (artefact.name.clone(), artefact)).collect()
     }
 
+    /// Runs the request to its end and reads the motion.
+    async fn motion_of(&self, request: &PlanSparse) -> model::Motion {
+        let results = self.succeeded(self.enqueue(request).await).await;
+        let asf = formats::asf::read(self.text(&results["skeleton.asf"]).await.as_bytes()).unwrap().value;
+        let amc = self.text(&results["motion.amc"]).await;
+        formats::amc::read(amc.as_bytes(), &asf, 60.0).unwrap().value
+    }
+
     async fn text(&self, artefact: &Artefact) -> String {
         let key: Key = artefact.store_key.parse().unwrap();
         let content = self.store.get_checked(&key, &artefact.blake3, 1 << 30).await.unwrap();
@@ -284,14 +292,8 @@ async fn cut_and_uncut_differ_by_less_than_half_a_degree() {
     let cut = fixture.request(files.clone());
     let mut uncut = fixture.request(files);
     uncut.parameters.chunk_frames = 1000;
-    let motions = [cut, uncut].map(|request| async {
-        let results = fixture.succeeded(fixture.enqueue(&request).await).await;
-        let asf = formats::asf::read(fixture.text(&results["skeleton.asf"]).await.as_bytes()).unwrap().value;
-        let amc = fixture.text(&results["motion.amc"]).await;
-        formats::amc::read(amc.as_bytes(), &asf, 60.0).unwrap().value
-    });
-    let [cut, uncut] = motions;
-    let errors = evaluation::compare(&uncut.await, &cut.await);
+    let (cut, uncut) = (fixture.motion_of(&cut).await, fixture.motion_of(&uncut).await);
+    let errors = evaluation::compare(&uncut, &cut);
     assert!(errors.rms_deg < 0.5, "{errors:?}");
     service.stop().await;
 }
@@ -349,7 +351,7 @@ async fn bad_input_fails_the_run_with_a_message_that_names_the_place() {
 }
 
 #[tokio::test]
-async fn a_payload_that_cannot_be_read_fails_the_run() {
+async fn a_parameter_out_of_range_fails_the_run_and_is_named() {
     let fixture = Fixture::new().await;
     let service = fixture.serve(1).await;
     let mut request = fixture.request(vec![]);
@@ -395,6 +397,20 @@ async fn a_pose_is_solved_at_once() {
             v1::SolvePoseRequest { skeleton_asf: "x".into(), ..request.clone() },
             Code::InvalidArgument,
             "skeleton_asf: ",
+        ),
+        (
+            v1::SolvePoseRequest { frame_rate_hz: 1.0, ..request.clone() },
+            Code::InvalidArgument,
+            "frame_rate_hz is 1, expected 10 to 10000",
+        ),
+        (
+            v1::SolvePoseRequest {
+                frames: vec![request.frames[0].clone(); 300],
+                frame_rate_hz: 10.0,
+                ..request.clone()
+            },
+            Code::InvalidArgument,
+            "length of the frames in seconds is 30, expected at most 20",
         ),
         (
             v1::SolvePoseRequest { frame_rate_hz: f64::NAN, ..request },
