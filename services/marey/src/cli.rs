@@ -34,26 +34,18 @@ Commands that talk to a server find one started by `marey up` in this folder or 
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Show what Marey does, on motion of its own or on yours
     Demo(demo::Args),
-    /// Start everything on this machine
     Up(up::Args),
     /// Build and list motion databases: the recordings that Marey learns from
     #[command(subcommand)]
     Db(database::Command),
-    /// Upload the files of a session: control points, skeleton, true motion
     Upload(upload::Args),
-    /// Reconstruct a session's motion
     Run(run::Args),
-    /// Download what a run has made
     Results(results::Args),
-    /// Show runs and how far they are
     Status(status::Args),
-    /// Cancel a run
     Cancel(status::CancelArgs),
     /// Measure how well motion is reconstructed, on recordings of your own
     Evaluate(evaluate::Args),
-    /// Write synthetic recordings to try things with
     Sample(sample::Args),
     /// Get recorded motion from public collections
     #[command(subcommand)]
@@ -61,18 +53,15 @@ enum Command {
     /// Run one service, configured by MAREY_… variables
     #[command(subcommand)]
     Serve(serve::Service),
-    /// Bring a database's schema up to date
     Migrate(keys::MigrateArgs),
     /// Make API keys
     #[command(subcommand)]
     Key(keys::Command),
-    /// Ask a service whether it is well; for probes
     Health(health::Args),
 }
 
 #[derive(Debug, Subcommand)]
 enum Data {
-    /// Download ASF and AMC files of the CMU Graphics Lab Motion Capture Database
     Cmu(cmu::Args),
 }
 

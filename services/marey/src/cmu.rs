@@ -21,7 +21,7 @@ const FRAME_RATE: f64 = 120.0;
 /// Tries of one file.
 const TRIES: u32 = 4;
 
-/// `marey data cmu`
+/// Download ASF and AMC files of the CMU Graphics Lab Motion Capture Database
 ///
 /// Writes DIR/16/16.asf, DIR/16/16_01.amc, … Files that are there are not downloaded again, and one that broke off is
 /// continued; so just start it again. The data are free for all uses, but may not be resold; see http://mocap.cs.cmu.edu.

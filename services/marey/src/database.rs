@@ -13,10 +13,6 @@ use crate::{
 /// `marey db …`
 #[derive(Debug, clap::Subcommand)]
 pub enum Command {
-    /// Build a motion database from recordings
-    ///
-    /// A name that exists gets a new version. Folders are searched for ASF and AMC (put each AMC beside the ASF of its
-    /// performer) and BVH files, also compressed ones (.zst, .gz); archives are taken as they are.
     #[command(after_help = "Examples:
   marey db build walks recordings/walks --watch
   marey db build cmu subject-16.zip subject-35.tar.gz --watch
@@ -24,11 +20,13 @@ pub enum Command {
     Build(BuildArgs),
     /// List motion databases
     List(ServerArgs),
-    /// Delete a motion database: NAME@VERSION
     Delete(DeleteArgs),
 }
 
-/// `marey db build`
+/// Build a motion database from recordings
+///
+/// A name that exists gets a new version. Folders are searched for ASF and AMC (put each AMC beside the ASF of its
+/// performer) and BVH files, also compressed ones (.zst, .gz); archives are taken as they are.
 #[derive(Debug, clap::Args)]
 pub struct BuildArgs {
     /// Name of the database: letters, digits, '.', '_' and '-'
@@ -43,7 +41,7 @@ pub struct BuildArgs {
     server: ServerArgs,
 }
 
-/// `marey db delete`
+/// Delete a motion database
 #[derive(Debug, clap::Args)]
 pub struct DeleteArgs {
     /// The database: NAME@VERSION, or its id

@@ -35,7 +35,7 @@ const POINT_SETS: [&[&str]; 2] = [
 /// Marey's method, and the baseline it is compared with.
 const METHODS: [&str; 2] = ["local-regression", "nearest"];
 
-/// `marey demo`
+/// Show what Marey does, on motion of its own or on yours
 ///
 /// Starts everything, builds a motion database, and reconstructs trials that are not in it from 4 and 6 of their points;
 /// then says how far the result is from the truth, and how far that of a plain baseline is. Without --data, it is shown
@@ -85,11 +85,23 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     })
 }
 
-/// What was measured of one reconstruction.
-struct Row {
-    trial: String,
+/// One reconstruction.
+struct Asked<'a> {
+    take: &'a Take,
     num_points: usize,
     method: &'static str,
+}
+
+impl Asked<'_> {
+    /// Name of the folder with its results.
+    fn folder(&self) -> String {
+        format!("{}-{}-points-{}", self.take.name, self.num_points, self.method)
+    }
+}
+
+/// What came of it.
+struct Row<'a> {
+    asked: Asked<'a>,
     report: Value,
     errors: Value,
 }
@@ -127,8 +139,8 @@ fn show(client: &Client, data: Option<&Path>, folder: &Path) -> anyhow::Result<(
             step(&format!("Session {name:?}: uploading and reconstructing"));
             let session = upload_session(client, &name, points, &recording)?;
             for method in METHODS {
-                let to = output.join(format!("{}-{}-points-{method}", take.name, points.len()));
-                rows.push(reconstruct(client, &session, &database, method, take, points.len(), &to)?);
+                let asked = Asked { take, num_points: points.len(), method };
+                rows.push(reconstruct(client, &session, &database, asked, &output)?);
             }
         }
     }
@@ -136,8 +148,8 @@ fn show(client: &Client, data: Option<&Path>, folder: &Path) -> anyhow::Result<(
     let synthetic = if data.is_none() { " The motion is synthetic; recorded motion is harder." } else { "" };
     println!("\nErrors are against the true motion, which was not used.{synthetic}");
     println!("\nEverything is in {}:", output.canonicalize().unwrap_or(output.clone()).display());
-    for entry in fs::read_dir(&output)?.flatten() {
-        println!("  {}", entry.file_name().to_string_lossy());
+    for row in &rows {
+        println!("  {}", row.asked.folder());
     }
     println!(
         "To look at one: in Blender, File > Import > Motion Capture (.bvh), then take its motion.bvh and press play."
@@ -200,31 +212,24 @@ fn upload_session(
     Ok(session)
 }
 
-fn reconstruct(
+fn reconstruct<'a>(
     client: &Client,
     session: &Session,
     database: &MotionDatabase,
-    method: &'static str,
-    take: &Take,
-    num_points: usize,
-    to: &Path,
-) -> anyhow::Result<Row> {
-    let request = json!({ "motion_database": database.id, "method": method });
+    asked: Asked<'a>,
+    output: &Path,
+) -> anyhow::Result<Row<'a>> {
+    let request = json!({ "motion_database": database.id, "method": asked.method });
     let run: Run = client.post(&format!("/v1/sessions/{}/runs", session.id), &request)?;
     watch::until_end(client, &run.id)?;
-    results::download(client, &run.id, to)?;
+    let to = output.join(asked.folder());
+    results::download(client, &run.id, &to)?;
     let read = |name: &str| -> anyhow::Result<Value> {
         let path = to.join(name);
         let text = fs::read(&path).with_context(|| path.display().to_string())?;
         serde_json::from_slice(&text).with_context(|| path.display().to_string())
     };
-    Ok(Row {
-        trial: take.name.clone(),
-        num_points,
-        method,
-        report: read("run.json")?,
-        errors: read("evaluation.json")?,
-    })
+    Ok(Row { report: read("run.json")?, errors: read("evaluation.json")?, asked })
 }
 
 fn print_table(rows: &[Row]) {
@@ -237,9 +242,9 @@ fn print_table(rows: &[Row]) {
         let error = |name: &str| row.errors[name].as_f64().unwrap_or(f64::NAN);
         println!(
             "{:<16} {:>6}  {:<17} {:>9.2} {:>12.2} {:>9} {:>9.0}",
-            row.trial,
-            row.num_points,
-            row.method,
+            row.asked.take.name,
+            row.asked.num_points,
+            row.asked.method,
             error("rms_deg"),
             error("mpjpe_cm"),
             row.report["session"]["frames"].as_u64().unwrap_or(0),

@@ -6,7 +6,7 @@ use sqlx::{Connection, PgConnection};
 
 use crate::{connection::Server, serve::runtime};
 
-/// `marey migrate`
+/// Bring a database's schema up to date
 #[derive(Debug, clap::Args)]
 pub struct MigrateArgs {
     /// PostgreSQL, such as postgres://user:password@host/name
@@ -17,17 +17,16 @@ pub struct MigrateArgs {
 /// `marey key …`
 #[derive(Debug, clap::Subcommand)]
 pub enum Command {
-    /// Make an API key for a project, and the project if there is none of that name
-    ///
-    /// The key is printed once and can't be shown again. Needs the database: that of `marey up` in this folder or above, or
-    /// MAREY_DATABASE_URL.
     #[command(after_help = "Examples:
   marey key create --project film
   marey key create --project film --scopes read --name \"wall display\"")]
     Create(CreateArgs),
 }
 
-/// `marey key create`
+/// Make an API key for a project, and the project if there is none of that name
+///
+/// The key is printed once and can't be shown again. Needs the database: that of `marey up` in this folder or above, or
+/// MAREY_DATABASE_URL.
 #[derive(Debug, clap::Args)]
 pub struct CreateArgs {
     /// Name of the project: letters, digits, '.', '_' and '-'

@@ -12,7 +12,7 @@ use crate::{
     client::{Client, ResultFile, encode},
 };
 
-/// `marey results`
+/// Download what a run has made
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:
   marey results 0198… -o take3/        then open take3/motion.bvh in Blender: File > Import > Motion Capture (.bvh)")]

@@ -9,7 +9,7 @@ use crate::{
     watch,
 };
 
-/// `marey run`
+/// Reconstruct a session's motion
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey run \"take 3\" --database walks --watch

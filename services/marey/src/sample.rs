@@ -12,7 +12,7 @@ use sample_motion::{Action, DrawOptions, FRAME_RATE, Model, NOTICE};
 /// Performers that the trials are of.
 const NUM_SUBJECTS: u32 = 4;
 
-/// `marey sample`
+/// Write synthetic recordings to try things with
 ///
 /// Draws trials from a small statistical model of human motion and writes them as ASF and AMC. They are synthetic: good for
 /// trying things, not for measuring how well real motion is reconstructed.

@@ -8,7 +8,7 @@ use crate::{
     watch,
 };
 
-/// `marey status`
+/// Show runs and how far they are
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A run's id; without it, the latest runs are listed
@@ -20,7 +20,7 @@ pub struct Args {
     server: ServerArgs,
 }
 
-/// `marey cancel`
+/// Cancel a run
 #[derive(Debug, clap::Args)]
 pub struct CancelArgs {
     /// The run's id

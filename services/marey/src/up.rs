@@ -25,7 +25,7 @@ use crate::{
 /// Running jobs get so long to end after Ctrl-C, before they are handed back to be done again.
 const GRACE: Duration = Duration::from_secs(5);
 
-/// `marey up`
+/// Start everything on this machine
 ///
 /// PostgreSQL, the HTTP interface and the services that do the work, in one process. Everything is kept in the data folder;
 /// start again and it is all there. Ctrl-C stops it. It is reachable from this machine only, unless --listen says otherwise.

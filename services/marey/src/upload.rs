@@ -9,7 +9,7 @@ use crate::{
     client::{Client, Session, encode},
 };
 
-/// `marey upload`
+/// Upload the files of a session: control points, skeleton, true motion
 ///
 /// The control points are a .csv (time,left_wrist_x,left_wrist_y,…; seconds and metres, y up), .trc or .c3d file. The
 /// performer's skeleton, .asf or .bvh, is optional: without it the motion database's is used. A true motion (.amc, .bvh), if
