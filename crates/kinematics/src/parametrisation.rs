@@ -179,6 +179,31 @@ impl Parametrisation {
         }
     }
 
+    /// Of all coordinates that stand for the same pose as `x`, takes those nearest to `near`, in place: what lies between the
+    /// two then is a pose between the two.
+    pub fn unwrap_near(&self, x: &mut [f64], near: &[f64]) {
+        for joint in &self.joints {
+            match joint {
+                JointRotation::Angles(angles) => {
+                    for (dof, _) in angles {
+                        x[*dof] = unwrap_near(x[*dof], near[*dof]);
+                    }
+                }
+                JointRotation::Vector { first_dof, .. } => {
+                    let vector = |x: &[f64]| Vector3::from_column_slice(&x[*first_dof..first_dof + 3]);
+                    let v = nearest_rotation_vector(&vector(x), &vector(near));
+                    x[*first_dof..first_dof + 3].copy_from_slice(v.as_slice());
+                }
+                JointRotation::HeadingTilt { first_dof } => {
+                    x[*first_dof] = unwrap_near(x[*first_dof], near[*first_dof]);
+                }
+            }
+        }
+        for &[a, b] in &self.flips {
+            [x[a], x[b]] = nearest_flip([x[a], x[b]], [near[a], near[b]]);
+        }
+    }
+
     /// Channel values of smooth coordinates: the inverse of [`Self::coordinates_from_pose`]. Euler angles are taken
     /// nearest to those of `previous` (a pose in channels), or to 0.
     pub fn pose_from_coordinates(

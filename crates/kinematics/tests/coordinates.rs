@@ -136,6 +136,29 @@ proptest! {
     }
 }
 
+proptest! {
+    #[test]
+    fn coordinates_near_others_are_the_same_pose_and_never_farther(seed: u64) {
+        let motion = walk();
+        let skeleton = motion.skeleton();
+        for (_, parametrisation) in parametrisations(&motion) {
+            let mut numbers = Numbers::new(seed);
+            let mut draw = || numbers.coordinates(&parametrisation, skeleton.num_dofs());
+            let (mut x, near) = (draw(), draw());
+            let kinematics = Kinematics::new(skeleton, parametrisation.clone());
+            let (mut before, mut after) = (kinematics.state(), kinematics.state());
+            let distance = |x: &[f64]| x.iter().zip(&near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            kinematics.update(&x, &mut before);
+            let far = distance(&x);
+            parametrisation.unwrap_near(&mut x, &near);
+            kinematics.update(&x, &mut after);
+            let (worst, joint) = difference(skeleton, &before, &after);
+            prop_assert!(worst < 1e-9, "{joint} moved by {worst}");
+            prop_assert!(distance(&x) <= far + 1e-9);
+        }
+    }
+}
+
 #[test]
 fn every_pose_of_drawn_motion_comes_back() {
     let motion = walk();

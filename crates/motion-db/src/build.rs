@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use kinematics::{HEADING, Kinematics, Parametrisation, References, rotation_from_angles, unwrap_near};
+use kinematics::{HEADING, Kinematics, Parametrisation, References, rotation_from_angles};
 use model::{Motion, Skeleton};
 use nalgebra::Matrix3;
 
@@ -129,16 +129,20 @@ pub fn resample(motion: &Motion, parametrisation: &Parametrisation) -> Vec<f64> 
     let duration = (motion.num_frames().saturating_sub(1)) as f64 / motion.frame_rate();
     let frames = (duration * FRAME_RATE + 1e-9).floor() as usize + 1;
     let mut out = Vec::with_capacity(frames * dofs);
+    let mut to = vec![0.0; dofs];
     for frame in 0..frames {
         let at = frame as f64 * ratio;
         let low = (at.floor() as usize).min(motion.num_frames() - 1);
         let high = (low + 1).min(motion.num_frames() - 1);
         let share = at - low as f64;
-        let (a, b) = (&all[low * dofs..][..dofs], &all[high * dofs..][..dofs]);
-        out.extend(a.iter().zip(b).enumerate().map(|(d, (a, b))| {
-            let b = if parametrisation.is_angle(d) { unwrap_near(*b, *a) } else { *b };
-            a + share * (b - a)
-        }));
+        let from = &all[low * dofs..][..dofs];
+        to.copy_from_slice(&all[high * dofs..][..dofs]);
+        parametrisation.unwrap_near(&mut to, from);
+        for (to, from) in to.iter_mut().zip(from) {
+            *to = from + share * (*to - from);
+        }
+        parametrisation.wrap(&mut to);
+        out.extend_from_slice(&to);
     }
     out
 }

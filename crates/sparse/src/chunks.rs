@@ -66,6 +66,7 @@ pub fn merge(
     }
     let mut coordinates = vec![0.0; frames * dofs];
     let mut quality = Vec::with_capacity(frames);
+    let mut blended = vec![0.0; dofs];
     for (chunk, part) in chunks.iter().zip(reconstructions) {
         let found = part.first_frame + part.quality.len();
         if part.first_frame != chunk.frames.start
@@ -84,9 +85,9 @@ pub fn merge(
                 continue;
             }
             let share = smooth_step((i + 1) as f64 / (parameters.blend_frames + 1) as f64);
-            for (d, (old, new)) in out.iter_mut().zip(new).enumerate() {
-                let is_angle = database.parametrisation().is_angle(d);
-                let new = if is_angle { kinematics::unwrap_near(*new, *old) } else { *new };
+            blended.copy_from_slice(new);
+            database.parametrisation().unwrap_near(&mut blended, out);
+            for (old, new) in out.iter_mut().zip(&blended) {
                 *old += share * (new - *old);
             }
         }
