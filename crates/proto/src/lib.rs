@@ -12,7 +12,11 @@ pub use error::{Error, ErrorCode};
 
 /// Generated messages, clients and servers of package `marey.v1`.
 pub mod v1 {
-    #![expect(missing_docs, reason = "generated; the .proto files are documented")]
+    #![expect(
+        missing_docs,
+        clippy::allow_attributes_without_reason,
+        reason = "generated; the .proto files are documented"
+    )]
     tonic::include_proto!("marey.v1");
 }
 
