@@ -94,14 +94,18 @@ pub fn kernel_weights(distances_squared: &[f64], bandwidth: f64, out: &mut [f64]
     }
     // Neighbours come nearest first; if not, the median is still found.
     let out = &mut out[..count];
-    out.copy_from_slice(distances_squared);
+    // What lies at infinity (a control point from a broken file) is far, but a number.
+    let finite = |d: &f64| d.min(f64::MAX);
+    for (out, d) in out.iter_mut().zip(distances_squared) {
+        *out = finite(d);
+    }
     out.sort_unstable_by(f64::total_cmp);
     let (nearest, median) = (out[0], out[count / 2]);
     let h_squared = (bandwidth * median).max(1e-12);
     let mut sum = 0.0;
     for (w, d) in out.iter_mut().zip(distances_squared) {
         // The nearest has exponent 0: a common factor that normalisation takes out again keeps the rest from underflow.
-        *w = (-0.5 * (d - nearest) / h_squared).exp();
+        *w = (-0.5 * (finite(d) - nearest) / h_squared).exp();
         sum += *w;
     }
     out.iter_mut().for_each(|w| *w /= sum);
