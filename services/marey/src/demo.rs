@@ -64,7 +64,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let up = up::Args { data_dir: folder.to_owned(), listen: ([127, 0, 0, 1], 0).into(), workers: None };
         let Some(everything) = Everything::start(&up, shutdown.clone()).await? else { return Ok(()) };
         let client = Client::new(everything.server.clone());
-        println!("  listening at {}", client.url());
+        println!("  listening at {}, database in {}", client.url(), everything.cluster_dir.display());
         let data = args.data.clone();
         let show = tokio::task::spawn_blocking(move || show(&client, data.as_deref(), folder));
         // Ctrl-C ends the services, and so whatever waits for them

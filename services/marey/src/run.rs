@@ -28,6 +28,12 @@ pub struct Args {
     /// Which marker of the file is which control point: MARKER=POINT; may be given often
     #[arg(long = "map", value_name = "MARKER=POINT")]
     mapping: Vec<String>,
+    /// Axis of a TRC or C3D file that points up: x, y or z [default: what the file says, else y for TRC, z for C3D]
+    #[arg(long, value_parser = ["x", "y", "z"])]
+    up: Option<String>,
+    /// Metres of one unit of BVH files [default: 0.01, centimetres]
+    #[arg(long, value_name = "METRES")]
+    bvh_unit: Option<f64>,
     /// local-regression, or nearest for a plain baseline [default: local-regression]
     #[arg(long)]
     method: Option<String>,
@@ -70,6 +76,8 @@ fn request(args: &Args) -> anyhow::Result<Value> {
             "mapping",
             (!args.mapping.is_empty()).then(|| pairs(&args.mapping, |point| point.into())).transpose()?,
         ),
+        ("up", args.up.as_ref().map(|axis| json!(axis))),
+        ("bvh_metres_per_unit", args.bvh_unit.map(Value::from)),
         ("method", args.method.as_ref().map(|m| json!(m))),
         ("window", args.window.map(Value::from)),
         ("neighbours", args.neighbours.map(Value::from)),
