@@ -192,14 +192,15 @@ impl<'a> Reconstructor<'a> {
         };
         let mut sigmas = vec![0.0; dofs];
         let mut track = self.start(&mut tracker, frames.start, None)?;
+        let mut before = track.clone();
         let mut lost = 0;
         for frame in frames.clone() {
-            let before = track.clone();
+            before.copy_from(&track);
             let mut step = tracker.step(&mut track, self.session.trajectories.frame(frame));
             lost = if step.energy() > self.parameters.lost_energy { lost + 1 } else { 0 };
             if lost >= self.parameters.lost_frames {
                 lost = 0;
-                track = self.start(&mut tracker, frame, Some(before))?;
+                track = self.start(&mut tracker, frame, Some(before.clone()))?;
                 step = tracker.step(&mut track, self.session.trajectories.frame(frame));
             }
             reconstruction.coordinates.extend_from_slice(track.newest());
@@ -224,7 +225,9 @@ impl<'a> Reconstructor<'a> {
         let trajectories = &self.session.trajectories;
         // Without two measured points there is nothing to fit: look at the first frame that has them.
         let has_two = |f: &usize| trajectories.frame(*f).iter().filter(|p| p.x.is_finite()).count() >= 2;
-        let first = (frame..trajectories.num_frames()).find(has_two).unwrap_or(frame);
+        let after = (frame..trajectories.num_frames()).find(has_two);
+        // Nothing comes any more: start as things stood when something was last measured.
+        let first = after.or_else(|| (0..frame).rev().find(has_two)).unwrap_or(frame);
         let ahead = self.parameters.start_frames.min(trajectories.num_frames() - first);
         let offsets: Vec<usize> = (0..ahead).step_by(3).collect();
         let observed: Vec<Option<Vector3<f64>>> = offsets

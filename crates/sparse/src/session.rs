@@ -12,6 +12,8 @@ use crate::{Error, Result};
 const FRAME_RATE: f64 = motion_db::FRAME_RATE;
 /// Most control points of a session.
 const MAX_POINTS: usize = 16;
+/// What is said to be farther from the origin than this (metres, in any direction) was not measured.
+const MAX_DISTANCE: f64 = 1e5;
 const MAGIC: &[u8; 8] = b"MAREYSES";
 
 /// A sparse capture session: the performer's skeleton and what was measured of them, at 60 frames a second.
@@ -41,7 +43,8 @@ struct PointRecord {
 
 impl Session {
     /// Picks the trajectories of `points` by name and brings them to 60 frames a second: whole ratios take every
-    /// n-th sample, others interpolate linearly between two measured samples.
+    /// n-th sample, others interpolate linearly between two measured samples. What is more than 100 km away was not
+    /// measured.
     ///
     /// # Errors
     /// If a point has no trajectory, there are fewer than 2 or more than 16 points, or no frame has two measured ones.
@@ -60,7 +63,8 @@ impl Session {
             })
         });
         let columns = columns.collect::<Result<Vec<_>>>()?;
-        let positions = resample(trajectories, &columns);
+        let mut positions = resample(trajectories, &columns);
+        forget_absurd(&mut positions);
         let names = points.iter().map(|p| p.name.clone()).collect();
         let trajectories = PointTrajectories::new(names, FRAME_RATE, positions)?;
         let has_enough = |frame| trajectories.frame(frame).iter().filter(|p| p.x.is_finite()).count() >= 2;
@@ -114,10 +118,18 @@ impl Session {
         let count = header.frames.checked_mul(points.len()).and_then(|n| n.checked_mul(3));
         let numbers = reader.numbers(count)?;
         reader.end()?;
-        let positions = numbers.as_chunks::<3>().0.iter().map(|p| Vector3::from(*p)).collect();
+        let mut positions: Vec<_> = numbers.as_chunks::<3>().0.iter().map(|p| Vector3::from(*p)).collect();
+        forget_absurd(&mut positions);
         let names = points.iter().map(|p| p.name.clone()).collect();
         let trajectories = PointTrajectories::new(names, FRAME_RATE, positions)?;
         Ok(Self { skeleton: skeleton.into(), points, trajectories })
+    }
+}
+
+/// Numbers of broken files, whose squares would swallow everything else.
+fn forget_absurd(positions: &mut [Vector3<f64>]) {
+    for p in positions.iter_mut().filter(|p| p.amax() > MAX_DISTANCE) {
+        *p = Vector3::repeat(f64::NAN);
     }
 }
 

@@ -24,6 +24,14 @@ impl Track {
     pub fn newest(&self) -> &[f64] {
         &self.history[0]
     }
+
+    /// Becomes a copy of `other`, a track with as many poses, in the memory there is.
+    pub fn copy_from(&mut self, other: &Self) {
+        for (to, from) in self.history.iter_mut().zip(&other.history) {
+            to.copy_from_slice(from);
+        }
+        self.matches.clone_from(&other.matches);
+    }
 }
 
 /// One frame's outcome.
