@@ -10,6 +10,7 @@ mod summary;
 
 pub use metrics::{Errors, compare};
 pub use sparse_protocol::{
-    ControlSet, Error, Protocol, SparseEvaluation, TrialResult, control_trajectories, evaluate_sparse,
+    ControlSet, Error, Protocol, SparseEvaluation, TrialResult, at_database_rate, control_trajectories,
+    evaluate_sparse,
 };
 pub use summary::{Row, summarise, table};

@@ -156,7 +156,7 @@ fn run_trial(
     parameters: &Parameters,
     seconds: &dyn Fn() -> f64,
 ) -> Result<TrialResult, sparse::Error> {
-    let truth = at_database_rate(database, clip, evaluation.max_frames)?;
+    let truth = at_database_rate(database, &clip.motion, evaluation.max_frames)?;
     let trajectories = control_trajectories(&truth, names)?;
     let points = control_points(truth.skeleton(), names)?;
     let session = Session::new(truth.skeleton().clone(), points, &trajectories)?;
@@ -190,25 +190,29 @@ fn to_motion(
     Ok(sparse::merge(database, session, &uncut, std::slice::from_ref(found))?.motion)
 }
 
-/// The first frames of a clip at 60 a second.
-fn at_database_rate(
+/// The first frames of a motion at 60 a second, in the file's channels. `database` gives the coordinates in which
+/// frames are interpolated where the rate is no multiple of 60.
+///
+/// # Errors
+/// If the skeleton has another structure than the database's.
+pub fn at_database_rate(
     database: &MotionDatabase,
-    clip: &Clip,
+    motion: &Motion,
     max_frames: usize,
 ) -> Result<Motion, sparse::Error> {
-    let skeleton = clip.motion.skeleton();
+    let skeleton = motion.skeleton();
     if let Some(difference) = database.structure_difference(skeleton) {
         return Err(sparse::Error::Skeleton { difference });
     }
     let dofs = skeleton.num_dofs();
-    let ratio = clip.motion.frame_rate() / FRAME_RATE;
+    let ratio = motion.frame_rate() / FRAME_RATE;
     let whole = ratio.round();
     if whole >= 1.0 && (ratio - whole).abs() < 0.01 * whole {
-        let frames = clip.motion.poses().step_by(whole as usize).take(max_frames);
+        let frames = motion.poses().step_by(whole as usize).take(max_frames);
         return Ok(Motion::new(skeleton.clone(), FRAME_RATE, frames.flatten().copied().collect())?);
     }
     let parametrisation = database.parametrisation();
-    let coordinates = motion_db::resample(&clip.motion, parametrisation);
+    let coordinates = motion_db::resample(motion, parametrisation);
     let frames = (coordinates.len() / dofs).min(max_frames);
     let mut values = vec![0.0; frames * dofs];
     for frame in 0..frames {

@@ -41,6 +41,10 @@ pub struct PlanSparse {
     pub points: Vec<String>,
     /// name in the file -> name of a control point or joint, for files with marker names of their own
     pub mapping: BTreeMap<String, String>,
+    /// axis of TRC and C3D files that points up, where the file does not say it or says it wrong
+    pub up: Option<model::Axis>,
+    /// metres of one unit of BVH files
+    pub bvh_metres_per_unit: f64,
     /// parameters of the method, all resolved (`sparse::Parameters`)
     pub parameters: serde_json::Value,
 }

@@ -1,8 +1,8 @@
 //! From a session's files to evidence: skeleton, control points, and the truth if it is known.
 
-use crate::error::InputError;
+use crate::{error::InputError, payload::Reading};
 use bytes::Bytes;
-use formats::{BvhOptions, PointsOptions, Read, archive, asf, points_csv};
+use formats::{Read, archive, asf, points_csv};
 use model::{Motion, PointTrajectories, Skeleton};
 use sparse::{Session, control_points};
 use std::{
@@ -49,6 +49,8 @@ pub(crate) struct Selection<'a> {
     pub points: &'a [String],
     /// Name in the file → name of a control point or joint.
     pub mapping: &'a BTreeMap<String, String>,
+    /// How the files are to be read.
+    pub reading: Reading,
 }
 
 /// What a session's files say.
@@ -56,6 +58,8 @@ pub(crate) struct Selection<'a> {
 pub(crate) struct Evidence {
     /// Skeleton, points and trajectories at 60 frames a second.
     pub session: Session,
+    /// Whether the skeleton is the performer's own, not the fallback.
+    pub is_own_skeleton: bool,
     /// What was sloppy, each with the file's name.
     pub warnings: Vec<String>,
 }
@@ -71,7 +75,7 @@ pub(crate) fn read(
 ) -> Result<Evidence, InputError> {
     let mut warnings = Vec::new();
     let skeleton = match at_most_one(files, "skeleton")? {
-        Some(file) => read_skeleton(file, &mut warnings)?.skeleton,
+        Some(file) => read_skeleton(file, selection.reading, &mut warnings)?.skeleton,
         None => {
             warnings.push("no skeleton file: the motion database's own skeleton is used".to_owned());
             fallback.clone()
@@ -83,12 +87,13 @@ pub(crate) fn read(
         names: String::new(),
         expected: "one (CSV, TRC or C3D)",
     })?;
-    let trajectories = read_points(file, &mut warnings)?;
+    let trajectories = read_points(file, selection.reading, &mut warnings)?;
     let trajectories = rename(trajectories, selection.mapping, &file.name)?;
     let names = selected(&trajectories, selection);
     let points = control_points(&skeleton, &names)?;
     let session = Session::new(skeleton, points, &trajectories)?;
-    if let Some(truth) = ground_truth(files, fallback, session.num_frames() as f64 / 60.0)? {
+    if let Some(truth) = ground_truth(files, fallback, selection.reading, session.num_frames() as f64 / 60.0)?
+    {
         warnings.extend(truth.warnings.iter().map(|w| w.to_string()));
         if !truth.value.skeleton().same_structure(&session.skeleton) {
             warnings.push(
@@ -96,7 +101,8 @@ pub(crate) fn read(
             );
         }
     }
-    Ok(Evidence { session, warnings })
+    let is_own_skeleton = at_most_one(files, "skeleton")?.is_some();
+    Ok(Evidence { session, is_own_skeleton, warnings })
 }
 
 /// The motion that really was, if a file has it; `seconds`: how long the session is, from which the frame rate of an AMC
@@ -107,15 +113,16 @@ pub(crate) fn read(
 pub(crate) fn ground_truth(
     files: &[NamedBytes],
     fallback: &Arc<Skeleton>,
+    reading: Reading,
     seconds: f64,
 ) -> Result<Option<Read<Motion>>, InputError> {
     let Some(file) = at_most_one(files, "ground-truth")? else { return Ok(None) };
     let in_file = |source| InputError::File { file: file.name.clone(), source };
     let read = match kind(&file.name).as_str() {
-        "bvh" => formats::bvh::read(&file.bytes, &BvhOptions::default()).map_err(in_file)?,
+        "bvh" => formats::bvh::read(&file.bytes, &reading.bvh).map_err(in_file)?,
         "amc" => {
             let acclaim = match at_most_one(files, "skeleton")?.filter(|f| kind(&f.name) == "asf") {
-                Some(skeleton) => read_skeleton(skeleton, &mut Vec::new())?,
+                Some(skeleton) => read_skeleton(skeleton, reading, &mut Vec::new())?,
                 None => asf::File { skeleton: fallback.clone(), metres_per_unit: asf::CMU_METRES_PER_UNIT },
             };
             let read = formats::amc::read(&file.bytes, &acclaim, AMC_FRAME_RATE).map_err(in_file)?;
@@ -137,12 +144,16 @@ fn amc_frame_rate(frames: usize, seconds: f64) -> f64 {
     best.filter(|rate| off(rate) < 0.05).unwrap_or(AMC_FRAME_RATE)
 }
 
-fn read_skeleton(file: &NamedBytes, warnings: &mut Vec<String>) -> Result<asf::File, InputError> {
+fn read_skeleton(
+    file: &NamedBytes,
+    reading: Reading,
+    warnings: &mut Vec<String>,
+) -> Result<asf::File, InputError> {
     let in_file = |source| InputError::File { file: file.name.clone(), source };
     match kind(&file.name).as_str() {
         "asf" => Ok(note(asf::read(&file.bytes).map_err(in_file)?, file, warnings)),
         "bvh" => {
-            let motion = formats::bvh::read(&file.bytes, &BvhOptions::default()).map_err(in_file)?;
+            let motion = formats::bvh::read(&file.bytes, &reading.bvh).map_err(in_file)?;
             let skeleton = note(motion, file, warnings).skeleton().clone();
             Ok(asf::File { skeleton, metres_per_unit: asf::CMU_METRES_PER_UNIT })
         }
@@ -150,12 +161,16 @@ fn read_skeleton(file: &NamedBytes, warnings: &mut Vec<String>) -> Result<asf::F
     }
 }
 
-fn read_points(file: &NamedBytes, warnings: &mut Vec<String>) -> Result<PointTrajectories, InputError> {
+fn read_points(
+    file: &NamedBytes,
+    reading: Reading,
+    warnings: &mut Vec<String>,
+) -> Result<PointTrajectories, InputError> {
     let in_file = |source| InputError::File { file: file.name.clone(), source };
     let read = match kind(&file.name).as_str() {
         "csv" => points_csv::read(&file.bytes),
-        "trc" => formats::trc::read(&file.bytes, &PointsOptions::default()),
-        "c3d" => formats::c3d::read(&file.bytes, &PointsOptions::default()),
+        "trc" => formats::trc::read(&file.bytes, &reading.points),
+        "c3d" => formats::c3d::read(&file.bytes, &reading.points),
         _ => return Err(kind_error(file, "control-points", "a CSV, TRC or C3D file")),
     };
     Ok(note(read.map_err(in_file)?, file, warnings))

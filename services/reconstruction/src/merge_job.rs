@@ -127,7 +127,9 @@ impl MergeHandler {
         let fetched = plan_job::fetch(store, &wanted, memory.max_object_bytes).await?;
         let database = priors.database(&payload.request.motion_database).await?;
         let merged = merged.clone();
-        let errors = compute::run(move || evaluate::errors(&fetched, &database, &merged.motion)).await?;
+        let reading = payload.request.reading();
+        let errors =
+            compute::run(move || evaluate::errors(&fetched, &database, &merged.motion, reading)).await?;
         let Some(errors) = errors else { return Ok(None) };
         let json = serde_json::to_vec_pretty(&errors).map_err(JobError::retry)?;
         Ok(Some(objects::write_result(store, job, evaluate::EVALUATION, "application/json", json).await?))

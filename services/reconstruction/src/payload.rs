@@ -1,5 +1,7 @@
 //! What the jobs of this service are given. Everything that decides the result is in here.
 
+use formats::{BvhOptions, PointsOptions};
+use model::Axis;
 use serde::{Deserialize, Serialize};
 use sparse::Parameters;
 use std::collections::BTreeMap;
@@ -23,8 +25,37 @@ pub struct PlanSparse {
     /// Name in the file → name of a control point or joint.
     #[serde(default)]
     pub mapping: BTreeMap<String, String>,
+    /// Axis of TRC and C3D files that points up, where the file does not say it or says it wrong.
+    #[serde(default)]
+    pub up: Option<Axis>,
+    /// Metres of one unit of BVH files.
+    #[serde(default = "centimetres")]
+    pub bvh_metres_per_unit: f64,
     /// All resolved.
     pub parameters: Parameters,
+}
+
+fn centimetres() -> f64 {
+    formats::BvhOptions::default().metres_per_unit
+}
+
+impl PlanSparse {
+    /// How the session's files are to be read.
+    pub(crate) fn reading(&self) -> Reading {
+        Reading {
+            points: PointsOptions { up: self.up },
+            bvh: BvhOptions { metres_per_unit: self.bvh_metres_per_unit },
+        }
+    }
+}
+
+/// What the files do not say of themselves.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reading {
+    /// Of TRC and C3D files.
+    pub points: PointsOptions,
+    /// Of BVH files.
+    pub bvh: BvhOptions,
 }
 
 /// An uploaded file.

@@ -47,7 +47,11 @@ impl Handler for PlanHandler {
 
         let (limit, asked) = (memory.max_session_frames, request.clone());
         let (evidence, bytes) = compute::run(move || -> Result<(Evidence, Vec<u8>), InputError> {
-            let selection = inputs::Selection { points: &asked.points, mapping: &asked.mapping };
+            let selection = inputs::Selection {
+                points: &asked.points,
+                mapping: &asked.mapping,
+                reading: asked.reading(),
+            };
             let evidence = inputs::read(&files, &selection, prior.database.skeleton())?;
             let frames = evidence.session.num_frames();
             if frames > limit {
@@ -91,11 +95,16 @@ pub(crate) async fn fetch(
 
 /// The chunk jobs, and the merge that waits for all of them.
 fn children(
-    request: PlanSparse,
+    mut request: PlanSparse,
     session: Object,
     evidence: Evidence,
     plan: JobReport,
 ) -> Result<Vec<ChildJob>, JobError> {
+    if !evidence.is_own_skeleton {
+        // Whose clips have a skeleton like the fallback says nothing about the performer.
+        request.parameters.skeleton_weight = 0.0;
+        request.parameters.start_skeleton_weight = 0.0;
+    }
     let num_frames = evidence.session.num_frames();
     let chunks = plan_chunks(num_frames, &request.parameters);
     let num_chunks = chunks.len();

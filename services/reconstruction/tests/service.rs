@@ -104,6 +104,8 @@ impl Fixture {
             files,
             points: vec![],
             mapping: BTreeMap::new(),
+            up: None,
+            bvh_metres_per_unit: 0.01,
             parameters,
         }
     }

@@ -45,6 +45,12 @@ pub(crate) struct NewReconstruction {
     #[serde(default)]
     #[schema(example = json!({"LWRA": "left_wrist"}))]
     mapping: BTreeMap<String, String>,
+    /// the axis of a TRC or C3D file that points up: `x`, `y` or `z`; what the file says, else y (TRC) or z (C3D), when left out
+    #[schema(value_type = Option<String>, example = "z")]
+    up: Option<model::Axis>,
+    /// metres of one unit of BVH files (their format has no unit); 0.01, centimetres, when left out
+    #[schema(example = 0.01)]
+    bvh_metres_per_unit: Option<f64>,
     /// `local-regression`, or `nearest` for the nearest-example baseline
     #[schema(example = "local-regression")]
     method: Option<String>,
@@ -110,6 +116,13 @@ pub(super) async fn reconstruction(
     if body.points.len().max(body.mapping.len()) > MAX_POINTS {
         return Err(Error::Unprocessable(format!("expected at most {MAX_POINTS} points")));
     }
+    let bvh_metres_per_unit =
+        body.bvh_metres_per_unit.unwrap_or(formats::BvhOptions::default().metres_per_unit);
+    if !(1e-6..=1e3).contains(&bvh_metres_per_unit) {
+        return Err(Error::Unprocessable(format!(
+            "bvh_metres_per_unit is {bvh_metres_per_unit}, expected 0.000001 to 1000"
+        )));
+    }
     let mut tx = app.db.begin().await?;
     if let Some(answer) = request.replay(&mut tx, project_id).await? {
         return Ok(answer);
@@ -125,6 +138,8 @@ pub(super) async fn reconstruction(
         files: inputs(&mut tx, session_id).await?,
         points: body.points,
         mapping: body.mapping,
+        up: body.up,
+        bvh_metres_per_unit,
         parameters,
     };
     if !plan.files.iter().any(|file| file.role == "control-points") {
