@@ -1,0 +1,80 @@
+//! Guards the accuracy on recorded motion: bounds stand a little above what was measured.
+
+use std::path::Path;
+
+use evaluation::{Protocol, SparseEvaluation, TrialResult, evaluate_sparse};
+use motion_db::Clip;
+use sparse::{Method, Parameters};
+
+fn load(folder: &Path) -> Vec<Clip> {
+    let clip = |row: testdata::IndexRow| {
+        let (name, subject) = (row.get("trial").to_owned(), row.get("subject").to_owned());
+        let acclaim = formats::asf::read(&testdata::read(folder, &format!("{subject}.asf"))).unwrap().value;
+        let bytes = testdata::read(folder, &format!("{name}.amc"));
+        let motion = formats::amc::read(&bytes, &acclaim, 120.0).unwrap().value;
+        Clip { name, subject, action: row.get("action").to_owned(), motion }
+    };
+    testdata::index(folder).into_iter().map(clip).collect()
+}
+
+struct Means {
+    rms_deg: f64,
+    mae_deg: f64,
+    mpjpe_cm: f64,
+}
+
+/// Means over the trials of one method and number of points, and their table.
+fn means(results: &[TrialResult], method: Method, points: usize) -> Means {
+    let of_case: Vec<_> = results.iter().filter(|r| r.method == method && r.points == points).collect();
+    let mean = |value: &dyn Fn(&TrialResult) -> f64| {
+        of_case.iter().map(|r| value(r)).sum::<f64>() / of_case.len() as f64
+    };
+    let found = Means {
+        rms_deg: mean(&|r| r.errors.rms_deg),
+        mae_deg: mean(&|r| r.errors.mae_deg),
+        mpjpe_cm: mean(&|r| r.errors.mpjpe_cm),
+    };
+    let Means { rms_deg, mae_deg, mpjpe_cm } = found;
+    println!("{method}, {points} points: RMS {rms_deg:.3}, MAE {mae_deg:.3} degrees, {mpjpe_cm:.3} cm");
+    found
+}
+
+fn evaluate(clips: &[Clip], protocol: Protocol, points: &[usize], methods: &[Method]) -> Vec<TrialResult> {
+    let mut all: Vec<&Clip> =
+        clips.iter().filter(|c| ["walk", "run", "jump"].contains(&c.action.as_str())).collect();
+    all.sort_by(|a, b| a.name.cmp(&b.name));
+    // Every third trial, from the first on, is for tuning: these are others.
+    let test: Vec<Clip> = all.into_iter().skip(4).step_by(6).cloned().collect();
+    assert_eq!(test.len(), 23);
+    let evaluation = SparseEvaluation {
+        train: clips,
+        test: &test,
+        protocol,
+        points,
+        methods,
+        parameters: Parameters::default(),
+        max_frames: 120,
+    };
+    evaluate_sparse(&evaluation, &|| 0.0, &mut |_, _| {}).unwrap()
+}
+
+#[test]
+fn recorded_trials_are_reconstructed_as_well_as_before() {
+    let test = "recorded_trials_are_reconstructed_as_well_as_before";
+    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let clips = load(&folder);
+    let (local, nearest) = (Method::LocalRegression, Method::Nearest);
+    let results = evaluate(&clips, Protocol::TrialOut, &[4, 6], &[local, nearest]);
+    for (points, rms, mae, cm) in [(6, 3.85, 2.25, 0.72), (4, 4.45, 2.7, 1.85)] {
+        let found = means(&results, local, points);
+        assert!(found.rms_deg < rms, "{points} points: {} degrees RMS", found.rms_deg);
+        assert!(found.mae_deg < mae, "{points} points: {} degrees mean", found.mae_deg);
+        assert!(found.mpjpe_cm < cm, "{points} points: {} cm", found.mpjpe_cm);
+        let plain = means(&results, nearest, points);
+        assert!(found.rms_deg < plain.rms_deg && found.mpjpe_cm < plain.mpjpe_cm, "{points} points");
+    }
+    let results = evaluate(&clips, Protocol::SubjectOut, &[6], &[local]);
+    let found = means(&results, local, 6);
+    assert!(found.rms_deg < 8.8, "subject out: {} degrees RMS", found.rms_deg);
+    assert!(found.mpjpe_cm < 1.45, "subject out: {} cm", found.mpjpe_cm);
+}
