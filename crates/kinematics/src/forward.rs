@@ -65,11 +65,11 @@ impl Kinematics {
             })
             .collect();
         let mut dofs = vec![Dof { joint: 0, is_translation: false }; skeleton.num_dofs()];
-        for j in 0..skeleton.num_joints() {
+        for (j, joint) in joints.iter().enumerate() {
             for dof in skeleton.dofs(j) {
                 dofs[dof].joint = j;
             }
-            for (dof, _) in &joints[j].translations {
+            for (dof, _) in &joint.translations {
                 dofs[*dof].is_translation = true;
             }
         }

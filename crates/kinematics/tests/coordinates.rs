@@ -19,7 +19,7 @@ fn difference(skeleton: &Skeleton, a: &State, b: &State) -> (f64, String) {
         if !can_flip(skeleton, j) {
             found = found.max((a.rotations[j] - b.rotations[j]).norm());
         }
-        if !(found <= worst.0) {
+        if found > worst.0 || found.is_nan() {
             worst = (found, joint.name.clone());
         }
     }

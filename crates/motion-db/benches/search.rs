@@ -61,7 +61,7 @@ fn search(bencher: Bencher, poses: usize, with_controls: bool) {
     let Ok(points) = control_points(skeleton, &names) else { return };
     let points = PointSet::new(&kinematics, points);
     let table = ControlTable::new(&database, &index, skeleton, &kinematics, &points);
-    let mut weights = vec![1.0f32; 19];
+    let mut weights = [1.0f32; 19];
     weights[18] = 4.0;
     let coordinates = motion_db::resample(&asked.motion, database.parametrisation());
     let frames: Vec<&[f64]> = coordinates.chunks_exact(62).collect();

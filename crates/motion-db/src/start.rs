@@ -27,6 +27,10 @@ const DISTINCT_FRAMES: usize = 6;
 /// frames that must come before the pose in its clip; `skeleton_weight`: metres that a metre of unlikeness between
 /// skeletons counts for; `exclude`: ranges of poses not to be used, in rising order.
 /// Best first, at most `count`, no two within 6 frames of each other.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "two data sets, one observation, three limits: each named above"
+)]
 pub fn start_poses(
     database: &MotionDatabase,
     table: &ControlTable,

@@ -128,7 +128,8 @@ fn the_start_of_a_moved_clip_is_found_with_its_turn_and_shift() {
             assert!(found.iter().all(|s| s.pose == planted || s.pose.abs_diff(planted) > 6));
             // Left out, the pose is not found.
             let out = database.clips()[c].first_pose..database.clips()[c].first_pose + 200;
-            let found = start_poses(&database, &table, &offsets, &observed, 2, 0.3, &[out.clone()], 4);
+            let found =
+                start_poses(&database, &table, &offsets, &observed, 2, 0.3, std::slice::from_ref(&out), 4);
             assert!(!found.is_empty() && found.iter().all(|s| !out.contains(&s.pose)));
         }
     }

@@ -19,7 +19,9 @@ pub fn cholesky(a: &mut [f64], n: usize) -> bool {
     for j in 0..n {
         let square: f64 = a[j * n..j * n + j].iter().map(|v| v * v).sum();
         let pivot = a[j * n + j] - square;
-        if !(pivot > 0.0) {
+        // Also where it is not a number.
+        let is_positive = pivot > 0.0;
+        if !is_positive {
             return false;
         }
         let pivot = pivot.sqrt();

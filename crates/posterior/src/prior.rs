@@ -27,8 +27,8 @@ impl GaussianPrior {
                 }
             }
         }
-        for i in 0..dofs {
-            self.covariance[i * dofs + i] += min_sigma[i] * min_sigma[i];
+        for (i, sigma) in min_sigma.iter().enumerate() {
+            self.covariance[i * dofs + i] += sigma * sigma;
             for j in 0..i {
                 self.covariance[i * dofs + j] = self.covariance[j * dofs + i];
             }
@@ -39,9 +39,9 @@ impl GaussianPrior {
     pub fn set_diagonal(&mut self, residuals: &[f64], min_sigma: &[f64]) {
         let dofs = self.mean.len();
         self.covariance.fill(0.0);
-        for i in 0..dofs {
+        for (i, sigma) in min_sigma.iter().enumerate() {
             let sum: f64 = residuals.iter().skip(i).step_by(dofs).map(|r| r * r).sum();
-            self.covariance[i * dofs + i] = sum + min_sigma[i] * min_sigma[i];
+            self.covariance[i * dofs + i] = sum + sigma * sigma;
         }
     }
 }

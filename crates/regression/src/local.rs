@@ -238,8 +238,7 @@ mod tests {
         let mut prediction = Prediction::new(k, 1);
         let mut regression = LocalRegression::new(k, width, 1);
         regression.predict(&examples, &x[..width], &parameters, &mut prediction);
-        let w = &prediction.weights;
-        for left_out in 0..k {
+        for (left_out, weight) in prediction.weights.iter().enumerate() {
             let keep: Vec<usize> = (0..k).filter(|&r| r != left_out).collect();
             let centred = |r: usize, i: usize| regression.inputs[r * width + i];
             let normal = Mat::<f64>::from_fn(width, width, |i, j| {
@@ -252,7 +251,7 @@ mod tests {
             let a = normal.partial_piv_lu().solve(&right);
             let fitted: f64 = (0..width).map(|i| a[(i, 0)] * centred(left_out, i)).sum();
             let expected = regression.targets[left_out] - fitted;
-            assert!((prediction.residuals[left_out] - expected).abs() < 1e-9, "{left_out} {}", w[left_out]);
+            assert!((prediction.residuals[left_out] - expected).abs() < 1e-9, "{left_out} {weight}");
         }
     }
 }
