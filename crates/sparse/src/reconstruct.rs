@@ -98,16 +98,16 @@ impl Reconstruction {
 
 /// Reconstructs frames of one session with one database.
 pub struct Reconstructor<'a> {
-    database: &'a MotionDatabase,
-    index: &'a WindowIndex,
-    session: &'a Session,
-    parameters: &'a Parameters,
-    kinematics: Kinematics,
-    points: PointSet,
-    table: std::sync::Arc<ControlTable>,
+    pub(crate) database: &'a MotionDatabase,
+    pub(crate) index: &'a WindowIndex,
+    pub(crate) session: &'a Session,
+    pub(crate) parameters: &'a Parameters,
+    pub(crate) kinematics: Kinematics,
+    pub(crate) points: PointSet,
+    pub(crate) table: std::sync::Arc<ControlTable>,
     /// windows and poses that may not be used, in rising order
-    exclude_rows: Vec<Range<usize>>,
-    exclude_poses: Vec<Range<usize>>,
+    pub(crate) exclude_rows: Vec<Range<usize>>,
+    pub(crate) exclude_poses: Vec<Range<usize>>,
 }
 
 impl<'a> Reconstructor<'a> {
@@ -174,16 +174,7 @@ impl<'a> Reconstructor<'a> {
         if frames.start >= frames.end || frames.end > total {
             return Err(Error::Range { start: frames.start, end: frames.end, frames: total });
         }
-        let mut tracker = Tracker::new(
-            self.database,
-            self.index,
-            &self.table,
-            self.session,
-            &self.kinematics,
-            &self.points,
-            self.parameters,
-            &self.exclude_rows,
-        );
+        let mut tracker = Tracker::new(self);
         let dofs = self.database.num_dofs();
         let mut reconstruction = Reconstruction {
             first_frame: frames.start,

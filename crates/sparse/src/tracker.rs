@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use kinematics::{Kinematics, PointSet};
+use kinematics::Kinematics;
 use motion_db::{
     ControlTable, HeadingFrame, MotionDatabase, Neighbour, Query, Scratch, SkeletonSize, StartPose,
     WindowIndex,
@@ -10,7 +10,7 @@ use posterior::{ControlPoints, GaussianPrior, MapSolver, Measurement, Solution};
 use regression::{LocalRegression, NearestExample, Prediction, Predictor};
 
 use crate::examples::ExampleBuffer;
-use crate::{Covariance, Method, Parameters, Session};
+use crate::{Covariance, Method, Parameters, Reconstructor};
 
 /// What is known of the person at a frame: the last m poses, newest first, in world coordinates (metres, radians,
 /// the performer's scale), and the rows that matched last.
@@ -87,16 +87,10 @@ pub struct Tracker<'a> {
 }
 
 impl<'a> Tracker<'a> {
-    pub fn new(
-        database: &'a MotionDatabase,
-        index: &'a WindowIndex,
-        table: &'a ControlTable,
-        session: &Session,
-        kinematics: &'a Kinematics,
-        points: &PointSet,
-        parameters: &'a Parameters,
-        exclude: &'a [Range<usize>],
-    ) -> Self {
+    /// A tracker of the session, database and exclusions of `reconstructor`.
+    pub fn new(reconstructor: &'a Reconstructor<'_>) -> Self {
+        let Reconstructor { database, index, session, parameters, kinematics, points, table, .. } =
+            reconstructor;
         let dofs = database.num_dofs();
         let k = parameters.neighbours;
         let num_controls = 3 * points.len();
@@ -134,7 +128,7 @@ impl<'a> Tracker<'a> {
             table,
             parameters,
             kinematics,
-            exclude,
+            exclude: &reconstructor.exclude_rows,
         }
     }
 

@@ -30,15 +30,14 @@ fn cut(
     merge(&recorded.database, session, parameters, &parts).unwrap()
 }
 
-/// Difference between the cut and the uncut run, degrees RMS; largest jump of a joint angle at a seam beside the
-/// largest anywhere in the uncut run, degrees.
+/// Difference between the cut and the uncut run: joint angles, degrees RMS, and mean joint position, cm.
 fn difference(
     recorded: &Recorded,
     truth: &Motion,
     names: &[&str],
     parameters: &Parameters,
     what: &str,
-) -> f64 {
+) -> (f64, f64) {
     let session = session(truth, names);
     let whole = recorded.motion(&session, &recorded.reconstruct(&session, &uncut(&session)));
     let merged = cut(recorded, &session, parameters, |_| {}).motion;

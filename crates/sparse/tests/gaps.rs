@@ -53,11 +53,11 @@ fn points_that_are_hidden_for_half_a_second_are_survived() {
     for seed in 0..4 {
         let truth = trial(seed);
         let whole = session(&truth, &SIX);
-        for hidden in 0..6 {
+        for (hidden, name) in SIX.into_iter().enumerate() {
             let one =
                 changed(&whole, |f, p, v| if GAP.contains(&f) && p == hidden { NOT_MEASURED } else { v });
-            let (within, after) = survives(&recorded, &truth, &one, GAP, SIX[hidden]);
-            assert!(within < 3.0 && after < 1.5, "{} hidden: {within} cm, then {after} cm", SIX[hidden]);
+            let (within, after) = survives(&recorded, &truth, &one, GAP, name);
+            assert!(within < 3.0 && after < 1.5, "{name} hidden: {within} cm, then {after} cm");
         }
         let four = session(&truth, &SIX[..4]);
         let one = changed(&four, |f, p, v| if GAP.contains(&f) && p == 2 { NOT_MEASURED } else { v });
