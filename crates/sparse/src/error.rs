@@ -28,6 +28,23 @@ pub enum Error {
         /// most points
         max: usize,
     },
+    /// A control point asked for twice.
+    #[error("control point {name} is there twice, expected every point once")]
+    PointTwice {
+        /// its name
+        name: String,
+    },
+    /// Points too far apart to be on one body.
+    #[error(
+        "control points are {spread_m:.1} m apart in half of the frames, the skeleton's legs are {leg_m:.2} m long: \
+         expected positions in metres (they may be in millimetres or centimetres)"
+    )]
+    Unit {
+        /// median over the frames of the widest distance, metres
+        spread_m: f64,
+        /// leg length of the skeleton, metres
+        leg_m: f64,
+    },
     /// Not enough was measured to begin with.
     #[error(
         "session has {frames} frames with fewer than two measured control points in each, expected a frame with at least two"

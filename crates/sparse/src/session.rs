@@ -56,6 +56,11 @@ impl Session {
         if !(2..=MAX_POINTS).contains(&points.len()) {
             return Err(Error::PointCount { found: points.len(), max: MAX_POINTS });
         }
+        if let Some(twice) =
+            points.iter().enumerate().find(|(i, p)| points[..*i].iter().any(|q| q.name == p.name))
+        {
+            return Err(Error::PointTwice { name: twice.1.name.clone() });
+        }
         let columns = points.iter().map(|point| {
             trajectories.point_index(&point.name).ok_or_else(|| Error::NoTrajectory {
                 name: point.name.clone(),
@@ -71,6 +76,7 @@ impl Session {
         if !(0..trajectories.num_frames()).any(has_enough) {
             return Err(Error::NothingMeasured { frames: trajectories.num_frames() });
         }
+        check_unit(&skeleton, &trajectories)?;
         Ok(Self { skeleton, points, trajectories })
     }
 
@@ -131,6 +137,27 @@ fn forget_absurd(positions: &mut [Vector3<f64>]) {
     for p in positions.iter_mut().filter(|p| p.amax() > MAX_DISTANCE) {
         *p = Vector3::repeat(f64::NAN);
     }
+}
+
+/// Points of one body are never much further apart than the body is long: if they are, their unit is wrong. Looks at
+/// the widest pair of every frame and takes the median over the frames, so that single wild samples do not count.
+fn check_unit(skeleton: &Skeleton, trajectories: &PointTrajectories) -> Result<()> {
+    let spread = |frame| {
+        let measured: Vec<_> = trajectories.frame(frame).iter().filter(|p| p.x.is_finite()).collect();
+        let pairs = measured
+            .iter()
+            .enumerate()
+            .flat_map(|(i, p)| measured[..i].iter().map(move |q| (*p - *q).norm()));
+        pairs.max_by(f64::total_cmp)
+    };
+    let mut spreads: Vec<f64> = (0..trajectories.num_frames()).filter_map(spread).collect();
+    spreads.sort_by(f64::total_cmp);
+    let Some(&spread_m) = spreads.get(spreads.len() / 2) else { return Ok(()) };
+    let leg_m = motion_db::SkeletonSize::leg_length(skeleton);
+    if spread_m > 10.0 * leg_m {
+        return Err(Error::Unit { spread_m, leg_m });
+    }
+    Ok(())
 }
 
 fn resample(trajectories: &PointTrajectories, columns: &[usize]) -> Vec<Vector3<f64>> {

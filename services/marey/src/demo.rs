@@ -113,7 +113,8 @@ fn show(client: &Client, data: Option<&Path>, folder: &Path) -> anyhow::Result<(
             step("Drawing synthetic trials (walking, running, jumping, boxing)");
             let samples = folder.join("sample-motion");
             remove(&samples)?;
-            Trials { count: NUM_SAMPLES, seed: 1, action: None, frames: 240 }.write(&samples)?;
+            Trials { count: NUM_SAMPLES, seed: 1, action: None, frames: 240, points: None }
+                .write(&samples)?;
             println!("  {NUM_SAMPLES} trials in {}: {}", samples.display(), sample_motion::NOTICE);
             samples
         }

@@ -28,6 +28,7 @@ use clap::Parser;
 
 /// Runs the command given on the command line.
 pub fn main() -> ExitCode {
+    end_quietly_on_a_closed_pipe();
     match cli::run(cli::Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -35,4 +36,17 @@ pub fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// `marey status | head -1` closes our output while we write: that is no fault worth a report. The standard library panics
+/// there.
+fn end_quietly_on_a_closed_pipe() {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let message = panic.payload_as_str().unwrap_or_default();
+        if message.starts_with("failed printing to stdout") && message.contains("Broken pipe") {
+            std::process::exit(0);
+        }
+        report(panic);
+    }));
 }

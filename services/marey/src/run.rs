@@ -63,9 +63,19 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     println!("run {}", run.id);
     if args.watch {
         watch::until_end(&client, &run.id)?;
+        for warning in warnings(&client, &run.id)? {
+            eprintln!("warning: {warning}");
+        }
         println!("done; download the motion with\n  marey results {} -o FOLDER", run.id);
     }
     Ok(())
+}
+
+/// What was sloppy about the files, as the run's report has it.
+fn warnings(client: &Client, run: &str) -> anyhow::Result<Vec<String>> {
+    let report: Value = client.get(&format!("/v1/runs/{run}/results/run.json"))?;
+    let warnings = report["warnings"].as_array().into_iter().flatten();
+    Ok(warnings.filter_map(Value::as_str).map(str::to_owned).collect())
 }
 
 fn request(args: &Args) -> anyhow::Result<Value> {

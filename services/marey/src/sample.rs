@@ -7,6 +7,7 @@ use std::{
 };
 
 use anyhow::Context;
+use evaluation::{ControlSet, control_trajectories};
 use sample_motion::{Action, DrawOptions, FRAME_RATE, Model, NOTICE};
 
 /// Performers that the trials are of.
@@ -18,13 +19,14 @@ const NUM_SUBJECTS: u32 = 4;
 /// trying things, not for measuring how well real motion is reconstructed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:
-  marey sample --out samples/ --count 20 --seed 1 --action walk")]
+  marey sample --out samples/ --count 20 --seed 1 --action walk
+  marey sample --out take/ --count 1 --seed 2 --action walk --points 6")]
 pub struct Args {
     /// Folder to write to
     #[arg(long)]
     out: PathBuf,
     /// How many trials
-    #[arg(long, default_value_t = 10)]
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     count: u32,
     /// Another seed gives other trials, the same seed the same
     #[arg(long, default_value_t = 1)]
@@ -33,13 +35,23 @@ pub struct Args {
     #[arg(long)]
     action: Option<Action>,
     /// Frames of each trial, at 60 a second
-    #[arg(long, default_value_t = 240)]
-    frames: usize,
+    #[arg(long, default_value_t = 240, value_parser = clap::value_parser!(u32).range(8..=1_000_000))]
+    frames: u32,
+    /// Also write the paths of so many control points of each trial, 2 to 6, as TRIAL.points.csv: a session to upload
+    #[arg(long)]
+    points: Option<usize>,
 }
 
 /// Runs `marey sample`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let trials = Trials { count: args.count, seed: args.seed, action: args.action, frames: args.frames };
+    let points = match args.points {
+        Some(count) => {
+            Some(ControlSet::names(count).with_context(|| format!("--points is {count}, expected 2 to 6"))?)
+        }
+        None => None,
+    };
+    let frames = args.frames as usize;
+    let trials = Trials { count: args.count, seed: args.seed, action: args.action, frames, points };
     trials.write(&args.out)?;
     println!("wrote {} trials to {}: {NOTICE}", args.count, args.out.display());
     Ok(())
@@ -55,6 +67,8 @@ pub struct Trials {
     pub action: Option<Action>,
     /// frames of each, at 60 a second
     pub frames: usize,
+    /// control points whose paths are written too
+    pub points: Option<&'static [&'static str]>,
 }
 
 impl Trials {
@@ -78,6 +92,10 @@ impl Trials {
             let trial = format!("{subject}_{:02}", number + 1);
             put(&format!("{subject}.asf"), &formats::asf::write(motion.skeleton()))?;
             put(&format!("{trial}.amc"), &formats::amc::write(&motion))?;
+            if let Some(names) = self.points {
+                let points = control_trajectories(&motion, names)?;
+                put(&format!("{trial}.points.csv"), &formats::points_csv::write(&points))?;
+            }
             let frames = motion.num_frames();
             writeln!(
                 index,

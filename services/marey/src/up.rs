@@ -64,7 +64,15 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         if everything.cluster_dir.parent() != Some(&everything.data_dir) {
             println!("  database  {}", everything.cluster_dir.display());
         }
-        println!("\nCommands run in this folder find it by themselves; try `marey --help`. Ctrl-C stops it.");
+        if everything.data_dir.ends_with(DEFAULT_DATA_DIR) {
+            println!(
+                "\nCommands run in this folder find it by themselves; try `marey --help`. Ctrl-C stops it."
+            );
+        } else {
+            println!("\nFor commands in another terminal:");
+            println!("  export MAREY_URL={} MAREY_API_KEY={}", server.url, server.api_key);
+            println!("Ctrl-C stops it.");
+        }
         everything.until_stopped(shutdown).await
     })
 }

@@ -66,12 +66,13 @@ fn quality(quality: &[FrameQuality], frame_rate: f64) -> String {
     let mut out =
         String::from("frame,time,measured_points,residual_m,sigma_rad,energy,neighbour_distance_deg\n");
     for (frame, q) in quality.iter().enumerate() {
+        // Where nothing was measured there is no residual, not one of 0.
+        let residual = if q.measured_points > 0 { format!("{:.7}", q.residual_m) } else { String::new() };
         let _ = writeln!(
             out,
-            "{frame},{:.6},{},{:.7},{:.7},{:.6},{:.6}",
+            "{frame},{:.6},{},{residual},{:.7},{:.6},{:.6}",
             frame as f64 / frame_rate,
             q.measured_points,
-            q.residual_m,
             q.sigma_rad,
             q.energy,
             q.neighbour_distance_deg

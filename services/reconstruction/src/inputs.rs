@@ -58,8 +58,6 @@ pub(crate) struct Selection<'a> {
 pub(crate) struct Evidence {
     /// Skeleton, points and trajectories at 60 frames a second.
     pub session: Session,
-    /// Whether the skeleton is the performer's own, not the fallback.
-    pub is_own_skeleton: bool,
     /// What was sloppy, each with the file's name.
     pub warnings: Vec<String>,
 }
@@ -101,8 +99,7 @@ pub(crate) fn read(
             );
         }
     }
-    let is_own_skeleton = at_most_one(files, "skeleton")?.is_some();
-    Ok(Evidence { session, is_own_skeleton, warnings })
+    Ok(Evidence { session, warnings })
 }
 
 /// The motion that really was, if a file has it; `seconds`: how long the session is, from which the frame rate of an AMC

@@ -6,6 +6,7 @@ use crate::{
     inputs::{self, Evidence, NamedBytes},
     payload::{InputFile, JobReport, MergeChunks, Object, PlanSparse, ReconstructChunk},
 };
+use model::Skeleton;
 use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use sparse::{Reconstructor, plan_chunks};
@@ -52,7 +53,10 @@ impl Handler for PlanHandler {
                 mapping: &asked.mapping,
                 reading: asked.reading(),
             };
-            let evidence = inputs::read(&files, &selection, prior.database.skeleton())?;
+            let mut evidence = inputs::read(&files, &selection, prior.database.skeleton())?;
+            if is_synthetic(prior.database.skeleton()) {
+                evidence.warnings.push("the motion database is synthetic: drawn, not recorded".to_owned());
+            }
             let frames = evidence.session.num_frames();
             if frames > limit {
                 return Err(InputError::TooLong { frames, limit });
@@ -77,6 +81,11 @@ impl Handler for PlanHandler {
     }
 }
 
+/// Whether a skeleton comes from the sample motion, which names its skeletons so.
+fn is_synthetic(skeleton: &Skeleton) -> bool {
+    skeleton.name().to_ascii_lowercase().starts_with("synthetic")
+}
+
 /// Reads files, unpacked where they are compressed.
 pub(crate) async fn fetch(
     store: &Store,
@@ -95,16 +104,11 @@ pub(crate) async fn fetch(
 
 /// The chunk jobs, and the merge that waits for all of them.
 fn children(
-    mut request: PlanSparse,
+    request: PlanSparse,
     session: Object,
     evidence: Evidence,
     plan: JobReport,
 ) -> Result<Vec<ChildJob>, JobError> {
-    if !evidence.is_own_skeleton {
-        // Whose clips have a skeleton like the fallback says nothing about the performer.
-        request.parameters.skeleton_weight = 0.0;
-        request.parameters.start_skeleton_weight = 0.0;
-    }
     let num_frames = evidence.session.num_frames();
     let chunks = plan_chunks(num_frames, &request.parameters);
     let num_chunks = chunks.len();

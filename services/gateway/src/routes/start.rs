@@ -1,6 +1,6 @@
 //! Starting runs: parameters are resolved, then the run and its first job are inserted in one transaction.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use axum::extract::State;
 use queue::{NewJob, NewRun, ProjectId};
@@ -27,8 +27,10 @@ use crate::{
     },
 };
 
-/// Most control points, and most names in a mapping.
-const MAX_POINTS: usize = 256;
+/// Most names in a mapping.
+const MAX_NAMES: usize = 256;
+/// Numbers of control points that can be reconstructed from.
+const POINTS: std::ops::RangeInclusive<usize> = 2..=16;
 
 /// A reconstruction to be run. What is left out has its default; the run shows everything resolved.
 #[derive(Debug, Deserialize, ToSchema)]
@@ -66,11 +68,36 @@ pub(crate) struct NewReconstruction {
 }
 
 impl NewReconstruction {
-    /// All parameters of the method, those left out with their defaults.
-    fn resolve(&self) -> Result<Value> {
+    fn check_points(&self) -> Result<()> {
+        let refuse = |what: String| Err(Error::Unprocessable(what));
+        if self.mapping.len() > MAX_NAMES {
+            return refuse(format!("mapping has {} names, expected at most {MAX_NAMES}", self.mapping.len()));
+        }
+        if self.points.is_empty() {
+            return Ok(());
+        }
+        if !POINTS.contains(&self.points.len()) {
+            return refuse(format!("points has {} names, expected 2 to 16", self.points.len()));
+        }
+        let mut seen = BTreeSet::new();
+        match self.points.iter().find(|name| !seen.insert(*name)) {
+            Some(twice) => refuse(format!("points has {twice:?} twice, expected every point once")),
+            None => Ok(()),
+        }
+    }
+
+    /// All parameters of the method, those left out with their defaults. Without a skeleton of the performer's own the
+    /// database's is borrowed, and whose clips have one like it says nothing: they are not preferred.
+    fn resolve(&self, has_own_skeleton: bool) -> Result<Value> {
         let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
+        let mut given = self.given()?;
+        if !has_own_skeleton {
+            for name in ["skeleton_weight", "start_skeleton_weight"] {
+                given.entry(name).or_insert(Value::from(0.0));
+            }
+        }
         let parameters: sparse::Parameters =
-            serde_json::from_value(Value::Object(self.given()?)).map_err(|error| refuse(&error))?;
+            serde_json::from_value(Value::Object(given)).map_err(|error| refuse(&error))?;
         parameters.check().map_err(|error| refuse(&error))?;
         Ok(serde_json::to_value(&parameters)?)
     }
@@ -112,10 +139,9 @@ pub(super) async fn reconstruction(
     Posted { body, request }: Posted<NewReconstruction>,
 ) -> Result<Answer> {
     let project_id = caller.project_id;
-    let parameters = body.resolve()?;
-    if body.points.len().max(body.mapping.len()) > MAX_POINTS {
-        return Err(Error::Unprocessable(format!("expected at most {MAX_POINTS} points")));
-    }
+    // What is wrong with the request is said before anything is looked up.
+    body.resolve(true)?;
+    body.check_points()?;
     let bvh_metres_per_unit =
         body.bvh_metres_per_unit.unwrap_or(formats::BvhOptions::default().metres_per_unit);
     if !(1e-6..=1e3).contains(&bvh_metres_per_unit) {
@@ -131,11 +157,13 @@ pub(super) async fn reconstruction(
     let database =
         lookup::motion_database(&mut tx, project_id, &body.motion_database, Latest::Ready, Lock::Share)
             .await?;
+    let files = inputs(&mut tx, session_id).await?;
+    let parameters = body.resolve(files.iter().any(|file| file.role == "skeleton"))?;
     let plan = PlanSparse {
         session_id,
         session_name: session.name,
         motion_database: ready(&database)?,
-        files: inputs(&mut tx, session_id).await?,
+        files,
         points: body.points,
         mapping: body.mapping,
         up: body.up,

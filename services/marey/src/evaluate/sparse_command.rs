@@ -87,6 +87,8 @@ struct Report<'a> {
     database_poses: usize,
     tuning_trials: Vec<&'a str>,
     tested_trials: Vec<&'a str>,
+    /// whether any of the motion was drawn from the sample motion, not recorded
+    synthetic: bool,
 }
 
 /// Runs `marey evaluate sparse`.
@@ -134,7 +136,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     bar.finish_and_clear();
     let rows = summarise(&results, protocol, &parameters);
     print!("{}", table(&rows));
-    print_papers(&rows);
+    let synthetic = train.iter().chain(&test).any(is_synthetic);
+    if synthetic {
+        println!("\nThe motion is synthetic: it says nothing about recorded motion, nor beside the papers.");
+    } else {
+        print_papers(&rows);
+    }
     let tested: Vec<&str> = test.iter().map(|c| c.name.as_str()).collect();
     println!("\nprotocol {protocol}; {} trials in the database; tested on {}:", train.len(), tested.len());
     println!("{}", tested.join(" "));
@@ -146,14 +153,20 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             rows: &rows,
             parameters: &parameters,
             database_trials: train.len(),
-            database_poses: train.iter().map(|c| poses_at_60(c)).sum(),
+            database_poses: train.iter().map(poses_at_60).sum(),
             tuning_trials: tuning.clone(),
             tested_trials: tested,
+            synthetic,
         };
         fs::write(path, serde_json::to_vec_pretty(&report)?)
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(())
+}
+
+/// Whether a clip was drawn from the sample motion, which names its skeletons so.
+fn is_synthetic(clip: &Clip) -> bool {
+    clip.motion.skeleton().name().to_ascii_lowercase().starts_with("synthetic")
 }
 
 fn poses_at_60(clip: &Clip) -> usize {
