@@ -21,8 +21,13 @@ if [[ $MAREY_BINARIES == prebuilt ]]; then
     scripts/phase.sh "build marey" cargo build --release --locked -p marey
     install -D "${CARGO_TARGET_DIR:-target}/release/marey" dist/marey
 fi
-tests=(cargo test --release --locked --workspace --test compose)
-scripts/phase.sh "build the tests" "${tests[@]}" --no-run
+# Built before the stack is up, and then run as they are.
+built=$(mktemp)
+CARGO_TERM_COLOR=never scripts/phase.sh "build the tests" \
+    cargo test --release --locked --workspace --test compose --no-run 2>&1 | tee "$built" >&2
+tests=$(sed -n 's/^ *Executable .*compose.*(\(.*\))$/\1/p' "$built")
+rm -f "$built"
+[[ -x $tests ]] || { say "cargo did not say where the compose tests are"; exit 1; }
 scripts/docker-base-images.sh "$MAREY_DEBIAN" "$postgres"
 
 # A name and a port of its own: another stack on this machine is not touched.
@@ -71,4 +76,4 @@ say "the stack is up after $((SECONDS - start)) s, its gateway at $address"
 
 export MAREY_COMPOSE_URL=http://$address MAREY_COMPOSE_KEY=$MAREY_BOOTSTRAP_KEY MAREY_COMPOSE_COMMAND="${compose[*]}"
 # One after the other: they share the stack and change how many replicas it has.
-scripts/phase.sh "tests against the stack" "${tests[@]}" -- --test-threads=1
+scripts/phase.sh "tests against the stack" "$tests" --test-threads=1
