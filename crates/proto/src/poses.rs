@@ -34,7 +34,7 @@ mod tests {
     fn a_window_comes_back_as_it_went() {
         let poses = [to_wire(&[1.0, 2.0]), to_wire(&[3.0, 4.0])];
         assert_eq!(window(&poses, 2).unwrap(), [1.0, 2.0, 3.0, 4.0]);
-        assert_eq!(window(&[], 2).unwrap(), []);
+        assert!(window(&[], 2).unwrap().is_empty());
     }
 
     #[test]
