@@ -1,7 +1,7 @@
 //! How long one prediction takes, by the number of neighbours: windows of two 62-DOF poses and six control points.
 
 use divan::Bencher;
-use regression::{Examples, LocalRegression, Parameters, Prediction, Predictor};
+use regression::{Examples, LocalRegression, Parameters, Prediction, Predictor, Query};
 
 fn main() {
     divan::main();
@@ -17,7 +17,8 @@ fn local_regression(bencher: Bencher, neighbours: usize) {
     };
     let (inputs, targets) = (wave(neighbours * WIDTH, 0.71), wave(neighbours * DOFS, 0.37));
     let distances_squared: Vec<f64> = (0..neighbours).map(|k| 100.0 + k as f64).collect();
-    let query = wave(WIDTH, 1.3);
+    let inputs_now = wave(WIDTH, 1.3);
+    let query = Query { inputs: &inputs_now, recent: &[] };
     let examples = Examples {
         width: WIDTH,
         dofs: DOFS,

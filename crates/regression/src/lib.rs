@@ -7,12 +7,12 @@
 //! - [`NearestExample`]: the successor of the nearest window; the plain baseline.
 //!
 //! ```
-//! use regression::{Examples, LocalRegression, Parameters, Prediction, Predictor};
+//! use regression::{Examples, LocalRegression, Parameters, Prediction, Predictor, Query};
 //! let (inputs, targets) = (vec![0.0, 1.0, 2.0, 3.0], vec![0.0, 2.0, 4.0, 6.0]);
 //! let examples = Examples { width: 1, dofs: 1, inputs: &inputs, targets: &targets, distances_squared: &[2.2, 0.2, 0.3, 2.3] };
 //! let mut prediction = Prediction::new(4, 1);
 //! let parameters = Parameters { ridge: 1e-6, ridge_distance: 0.0, ..Parameters::default() };
-//! LocalRegression::new(4, 1, 1).predict(&examples, &[1.5], &parameters, &mut prediction);
+//! LocalRegression::new(4, 1, 1).predict(&examples, &Query { inputs: &[1.5], recent: &[] }, &parameters, &mut prediction);
 //! assert!((prediction.mean[0] - 3.0).abs() < 1e-3);
 //! ```
 
@@ -22,4 +22,4 @@ mod prediction;
 
 pub use local::LocalRegression;
 pub use nearest::NearestExample;
-pub use prediction::{Examples, Parameters, Prediction, Predictor, kernel_weights};
+pub use prediction::{Examples, Parameters, Prediction, Predictor, Query, kernel_weights};

@@ -5,7 +5,7 @@ use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef, Par};
 
 use crate::prediction::kernel_weights;
-use crate::{Examples, Parameters, Prediction, Predictor};
+use crate::{Examples, Parameters, Prediction, Predictor, Query};
 
 /// Local regression in its dual form (LR eq. 4–10 with the mends of method §2).
 ///
@@ -81,7 +81,7 @@ impl Predictor for LocalRegression {
     fn predict(
         &mut self,
         examples: &Examples<'_>,
-        query: &[f64],
+        query: &Query<'_>,
         parameters: &Parameters,
         out: &mut Prediction,
     ) {
@@ -89,8 +89,10 @@ impl Predictor for LocalRegression {
         if k == 0 {
             return;
         }
+        out.rows = examples.len();
+        out.sigma.fill(parameters.min_sigma);
         kernel_weights(examples.distances_squared, parameters.bandwidth, &mut out.weights);
-        self.centre(examples, query, out);
+        self.centre(examples, query.inputs, out);
         let nearest = examples.distances_squared.iter().copied().fold(f64::INFINITY, f64::min);
         let ridge = parameters.ridge + parameters.ridge_distance * nearest / width as f64;
 
@@ -218,7 +220,12 @@ mod tests {
         let examples = Examples { width, dofs, inputs: &x, targets: &y, distances_squared: &distances };
         let parameters = Parameters { ridge: 0.05, ridge_distance: 0.0, ..Parameters::default() };
         let mut prediction = Prediction::new(k, dofs);
-        LocalRegression::new(k, width, dofs).predict(&examples, &query, &parameters, &mut prediction);
+        LocalRegression::new(k, width, dofs).predict(
+            &examples,
+            &Query { inputs: &query, recent: &[] },
+            &parameters,
+            &mut prediction,
+        );
         for d in 0..dofs {
             let target: Vec<f64> = (0..k).map(|r| y[r * dofs + d]).collect();
             let expected = primal(&x, &target, &prediction.weights, &query, 0.05);
@@ -237,7 +244,12 @@ mod tests {
         let parameters = Parameters { ridge: 0.1, ridge_distance: 0.0, ..Parameters::default() };
         let mut prediction = Prediction::new(k, 1);
         let mut regression = LocalRegression::new(k, width, 1);
-        regression.predict(&examples, &x[..width], &parameters, &mut prediction);
+        regression.predict(
+            &examples,
+            &Query { inputs: &x[..width], recent: &[] },
+            &parameters,
+            &mut prediction,
+        );
         for (left_out, weight) in prediction.weights.iter().enumerate() {
             let keep: Vec<usize> = (0..k).filter(|&r| r != left_out).collect();
             let centred = |r: usize, i: usize| regression.inputs[r * width + i];

@@ -1,5 +1,5 @@
 use crate::prediction::kernel_weights;
-use crate::{Examples, Parameters, Prediction, Predictor};
+use crate::{Examples, Parameters, Prediction, Predictor, Query};
 
 /// The plain baseline: the next pose is the successor of the nearest window; its uncertainty is the weighted spread
 /// of the neighbours' successors about it.
@@ -10,16 +10,21 @@ impl Predictor for NearestExample {
     fn predict(
         &mut self,
         examples: &Examples<'_>,
-        _query: &[f64],
+        _query: &Query<'_>,
         parameters: &Parameters,
         out: &mut Prediction,
     ) {
+        if examples.is_empty() {
+            return;
+        }
         let nearest = examples
             .distances_squared
             .iter()
             .enumerate()
             .min_by(|a, b| a.1.total_cmp(b.1))
             .map_or(0, |(k, _)| k);
+        out.rows = examples.len();
+        out.sigma.fill(parameters.min_sigma);
         kernel_weights(examples.distances_squared, parameters.bandwidth, &mut out.weights);
         out.mean.copy_from_slice(examples.target(nearest));
         for k in 0..examples.len() {

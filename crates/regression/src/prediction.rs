@@ -30,6 +30,22 @@ impl Examples<'_> {
     }
 }
 
+/// What is known at a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Query<'a> {
+    /// what the examples' inputs are compared with, shape `[width]`
+    pub inputs: &'a [f64],
+    /// the last poses in the units and the frame of the targets, newest first, row-major, shape `[window, dofs]`
+    pub recent: &'a [f64],
+}
+
+impl<'a> Query<'a> {
+    /// The pose `back` frames ago (1: the newest), shape `[dofs]`; `None` beyond the window.
+    pub fn pose(&self, back: usize, dofs: usize) -> Option<&'a [f64]> {
+        self.recent.get((back - 1) * dofs..back * dofs)
+    }
+}
+
 /// What a prediction depends on besides its examples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameters {
@@ -50,13 +66,18 @@ impl Default for Parameters {
     }
 }
 
-/// A Gaussian over the next pose: mean μ and covariance `EᵀE + σ_min² I`.
+/// A Gaussian over the next pose: mean μ and covariance `EᵀE + diag(σ²)`.
 #[derive(Debug, Clone)]
 pub struct Prediction {
     /// μ, shape `[dofs]`
     pub mean: Vec<f64>,
-    /// E: residuals of the examples, each times the root of its weight, row-major, shape `[K, dofs]`
+    /// E, row-major; the leading `rows` rows count, shape `[K, dofs]`: residuals of the examples, each times the root of
+    /// its weight, or principal directions, each times its standard deviation
     pub residuals: Vec<f64>,
+    /// number of rows of E
+    pub rows: usize,
+    /// σ: what is uncertain besides, shape `[dofs]`
+    pub sigma: Vec<f64>,
     /// kernel weights ω of the examples, sum 1, shape `[K]`
     pub weights: Vec<f64>,
 }
@@ -67,22 +88,31 @@ impl Prediction {
         Self {
             mean: vec![0.0; dofs],
             residuals: vec![0.0; neighbours * dofs],
+            rows: 0,
+            sigma: vec![0.0; dofs],
             weights: vec![0.0; neighbours],
         }
     }
 }
 
-/// A method that predicts the next pose from examples. It keeps its memory from frame to frame and does not allocate
-/// while the number of examples stays within what it was made for.
+/// A method that predicts the next pose from examples. It keeps its memory from frame to frame, but nothing that a
+/// prediction depends on, and does not allocate while the number of examples stays within what it was made for.
 pub trait Predictor {
-    /// Fits the examples and predicts at `query`, shape `[width]`.
+    /// Predicts at `query`.
     fn predict(
         &mut self,
         examples: &Examples<'_>,
-        query: &[f64],
+        query: &Query<'_>,
         parameters: &Parameters,
         out: &mut Prediction,
     );
+
+    /// For priors that are Gaussian only to first order: linearises the last prediction again about `found`, the most
+    /// probable pose under it (shape `[dofs]`, units and frame of the targets), whose likelihood has energy `likelihood`.
+    /// `false` if `out` is as good as it gets and `found` is the answer.
+    fn relinearise(&mut self, _found: &[f64], _likelihood: f64, _out: &mut Prediction) -> bool {
+        false
+    }
 }
 
 /// Gaussian kernel weights `ω_k ∝ exp(−½ d_k²/h²)` with h² = `bandwidth` times the median of d² (method §2, mend 3),

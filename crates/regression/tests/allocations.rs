@@ -1,6 +1,6 @@
 //! A prediction takes no memory, whatever the number of examples up to the one it was made for.
 
-use regression::{Examples, LocalRegression, NearestExample, Parameters, Prediction, Predictor};
+use regression::{Examples, LocalRegression, NearestExample, Parameters, Prediction, Predictor, Query};
 
 fn numbers(count: usize, seed: u64) -> Vec<f64> {
     let mut state = seed;
@@ -17,7 +17,8 @@ fn allocations(predictor: &mut dyn Predictor, k: usize, width: usize, dofs: usiz
     distances_squared.sort_by(f64::total_cmp);
     let examples =
         Examples { width, dofs, inputs: &inputs, targets: &targets, distances_squared: &distances_squared };
-    let query = numbers(width, 4);
+    let inputs = numbers(width, 4);
+    let query = Query { inputs: &inputs, recent: &[] };
     let mut prediction = Prediction::new(64, dofs);
     // The matrix product sets itself up the first time a thread uses it.
     predictor.predict(&examples, &query, &Parameters::default(), &mut prediction);

@@ -1,10 +1,14 @@
 //! What a prediction must be, whatever the examples.
 
 use regression::{
-    Examples, LocalRegression, NearestExample, Parameters, Prediction, Predictor, kernel_weights,
+    Examples, LocalRegression, NearestExample, Parameters, Prediction, Predictor, Query, kernel_weights,
 };
 
 const EXACT: Parameters = Parameters { ridge: 1e-6, ridge_distance: 0.0, bandwidth: 1.0, min_sigma: 1.0 };
+
+fn at(inputs: &[f64]) -> Query<'_> {
+    Query { inputs, recent: &[] }
+}
 
 /// Examples of `y = A x + b`, on a grid that is known in full.
 fn affine(k: usize, width: usize, dofs: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
@@ -27,7 +31,7 @@ fn what_is_affine_is_predicted_beyond_the_examples() {
         Examples { width, dofs, inputs: &inputs, targets: &targets, distances_squared: &distances };
     let mut prediction = Prediction::new(k, dofs);
     let query: Vec<f64> = (0..width).map(|i| 25.0 + i as f64).collect();
-    LocalRegression::new(k, width, dofs).predict(&examples, &query, &EXACT, &mut prediction);
+    LocalRegression::new(k, width, dofs).predict(&examples, &at(&query), &EXACT, &mut prediction);
     for d in 0..dofs {
         assert!((prediction.mean[d] - line(&query, d)).abs() < 1e-4, "target {d}");
     }
@@ -50,10 +54,10 @@ fn a_prediction_does_not_depend_on_the_one_before() {
     let parameters = Parameters::default();
     let mut used = LocalRegression::new(40, width, dofs);
     let mut out = Prediction::new(40, dofs);
-    used.predict(&with(40), &[3.0; 6], &parameters, &mut out);
-    used.predict(&with(7), &query, &parameters, &mut out);
+    used.predict(&with(40), &at(&[3.0; 6]), &parameters, &mut out);
+    used.predict(&with(7), &at(&query), &parameters, &mut out);
     let (mut fresh, mut expected) = (LocalRegression::new(40, width, dofs), Prediction::new(40, dofs));
-    fresh.predict(&with(7), &query, &parameters, &mut expected);
+    fresh.predict(&with(7), &at(&query), &parameters, &mut expected);
     assert_eq!(out.mean, expected.mean);
     assert_eq!(out.residuals[..7 * dofs], expected.residuals[..7 * dofs]);
 }
@@ -65,7 +69,7 @@ fn a_strong_ridge_predicts_the_weighted_mean() {
         Examples { width: 3, dofs: 2, inputs: &inputs, targets: &targets, distances_squared: &distances };
     let parameters = Parameters { ridge: 1e12, ..EXACT };
     let mut out = Prediction::new(20, 2);
-    LocalRegression::new(20, 3, 2).predict(&examples, &[50.0; 3], &parameters, &mut out);
+    LocalRegression::new(20, 3, 2).predict(&examples, &at(&[50.0; 3]), &parameters, &mut out);
     for d in 0..2 {
         let mean: f64 = (0..20).map(|k| out.weights[k] * targets[2 * k + d]).sum();
         assert!((out.mean[d] - mean).abs() < 1e-6);
@@ -79,7 +83,7 @@ fn the_nearest_example_is_its_own_successor() {
     let examples =
         Examples { width: 3, dofs: 2, inputs: &inputs, targets: &targets, distances_squared: &distances };
     let mut out = Prediction::new(20, 2);
-    NearestExample.predict(&examples, &[0.0; 3], &Parameters::default(), &mut out);
+    NearestExample.predict(&examples, &at(&[0.0; 3]), &Parameters::default(), &mut out);
     assert_eq!(out.mean, targets[22..24]);
     assert_eq!(out.residuals[22..24], [0.0, 0.0]);
 }
@@ -97,7 +101,7 @@ fn degenerate_examples_give_finite_predictions() {
                 Examples { width, dofs, inputs: &inputs, targets: &targets, distances_squared: &distances };
             let mut out = Prediction::new(k, dofs);
             let mut regression = LocalRegression::new(k, width, dofs);
-            regression.predict(&examples, &[3.0; 4], &Parameters::default(), &mut out);
+            regression.predict(&examples, &at(&[3.0; 4]), &Parameters::default(), &mut out);
             let all = out.mean.iter().chain(&out.residuals).chain(&out.weights);
             assert!(all.clone().all(|v| v.is_finite()), "{k} examples, spread {spread}, {distance}: {out:?}");
             assert!((out.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);

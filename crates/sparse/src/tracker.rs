@@ -69,7 +69,7 @@ pub struct Tracker<'a> {
     prediction: Prediction,
     examples: ExampleBuffer,
     prior: GaussianPrior,
-    min_sigma: Vec<f64>,
+    sigma: Vec<f64>,
     likelihood: ControlPoints,
     solver: MapSolver,
     search: Scratch,
@@ -101,7 +101,6 @@ impl<'a> Tracker<'a> {
         };
         let mut control_weights = vec![0.0; num_controls + 1];
         control_weights[num_controls] = parameters.skeleton_weight.powi(2) as f32;
-        let per_dof = &index.scale().per_dof;
         Self {
             scale: database.leg_length() / SkeletonSize::leg_length(&session.skeleton),
             root_offset: session.skeleton.joints()[0].offset,
@@ -109,7 +108,7 @@ impl<'a> Tracker<'a> {
             prediction: Prediction::new(k, dofs),
             examples: ExampleBuffer::new(k, width, dofs),
             prior: GaussianPrior::new(dofs),
-            min_sigma: per_dof.iter().map(|s| parameters.min_sigma_deg / s).collect(),
+            sigma: vec![0.0; dofs],
             likelihood: ControlPoints::new(kinematics, points.clone()),
             solver: MapSolver::new(points.len(), dofs),
             search: Scratch::default(),
@@ -243,24 +242,25 @@ impl<'a> Tracker<'a> {
         let controls =
             self.parameters.control_points_in_query.then_some((self.table, &self.control_factors[..]));
         let examples = self.examples.gather(self.database, self.index, &self.neighbours, controls);
-        self.predictor.predict(&examples, &self.query, &self.parameters.regression(), &mut self.prediction);
+        let query = regression::Query { inputs: &self.query, recent: &self.features };
+        self.predictor.predict(&examples, &query, &self.parameters.regression(), &mut self.prediction);
         // From degrees and centimetres at the database's scale to radians and metres at the performer's.
         let dofs = self.prior.mean.len();
         for (d, per_unit) in self.index.scale().per_dof.iter().enumerate() {
             let factor = if d < 3 { 1.0 / (per_unit * self.scale) } else { 1.0 / per_unit };
             self.local[d] = factor;
             self.prior.mean[d] = self.prediction.mean[d] * factor;
+            self.sigma[d] = self.prediction.sigma[d] * factor;
         }
-        let count = self.neighbours.len();
-        let residuals = &mut self.prediction.residuals[..count * dofs];
+        let residuals = &mut self.prediction.residuals[..self.prediction.rows * dofs];
         for row in residuals.chunks_exact_mut(dofs) {
             for (r, factor) in row.iter_mut().zip(&self.local) {
                 *r *= factor;
             }
         }
         match self.parameters.covariance {
-            Covariance::Full => self.prior.set_full(residuals, &self.min_sigma),
-            Covariance::Diagonal => self.prior.set_diagonal(residuals, &self.min_sigma),
+            Covariance::Full => self.prior.set_full(residuals, &self.sigma),
+            Covariance::Diagonal => self.prior.set_diagonal(residuals, &self.sigma),
         }
     }
 }
