@@ -73,4 +73,22 @@ pub enum Error {
         /// number of points
         points: usize,
     },
+    /// The number of standard deviations is not that of the positions.
+    #[error("found {sigmas} standard deviations, expected one for each of {positions} positions")]
+    SigmaCount {
+        /// standard deviations found
+        sigmas: usize,
+        /// number of positions
+        positions: usize,
+    },
+    /// A standard deviation that is not positive and finite.
+    #[error("frame {frame}, point {point} has a standard deviation of {found} m, expected a positive number")]
+    Sigma {
+        /// frame, from 0
+        frame: usize,
+        /// name of the point
+        point: String,
+        /// the value found
+        found: f64,
+    },
 }

@@ -22,7 +22,7 @@ mod skeleton;
 pub use error::Error;
 pub use joint::{Axis, Channel, ChannelKind, Joint};
 pub use motion::Motion;
-pub use points::PointTrajectories;
+pub use points::{PointTrajectories, Samples};
 pub use record::SkeletonRecord;
 pub use skeleton::Skeleton;
 
