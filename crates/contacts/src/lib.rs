@@ -1,0 +1,1 @@
+//! Foot contacts: found in a motion, and held where they are.
