@@ -23,6 +23,14 @@ pub struct ClipInfo {
     pub(crate) proportions: Vec<f64>,
 }
 
+impl ClipInfo {
+    /// Proportions of the clip's skeleton: offset (x, y, z) and tip (x, y, z) of every joint, metres, shape
+    /// `[6·joints]`.
+    pub fn proportions(&self) -> &[f64] {
+        &self.proportions
+    }
+}
+
 /// Offset of every joint and tip from its parent, metres, shape `[6·joints]`: what tells one performer's skeleton from
 /// another's.
 pub(crate) fn proportions(skeleton: &Skeleton) -> Vec<f64> {
