@@ -57,7 +57,7 @@ impl MotionDatabase {
         };
         let skeleton = first.motion.skeleton().clone();
         for clip in clips {
-            check_structure(clip, first)?;
+            structure_mismatch(clip, &skeleton, &first.name)?;
         }
         let references = mean_references(clips);
         let parametrisation = Parametrisation::smooth(&skeleton, &references)
@@ -81,7 +81,7 @@ impl MotionDatabase {
         Ok(database)
     }
 
-    fn add(&mut self, clip: &Clip) -> Result<()> {
+    pub(crate) fn add(&mut self, clip: &Clip) -> Result<()> {
         let dofs = self.num_dofs();
         let coordinates = resample(&clip.motion, &self.parametrisation);
         let num_poses = coordinates.len() / dofs;
@@ -89,9 +89,7 @@ impl MotionDatabase {
             return Ok(());
         }
         let first_pose = self.num_poses();
-        if first_pose + num_poses > MAX_POSES {
-            return Err(Error::TooLarge { poses: first_pose + num_poses, limit: MAX_POSES });
-        }
+        self.check_size(first_pose + num_poses)?;
         let scale = self.leg_length / SkeletonSize::leg_length(clip.motion.skeleton());
         for pose in coordinates.chunks_exact(dofs) {
             let scaled = pose.iter().enumerate().map(|(d, v)| (if d < 3 { v * scale } else { *v }) as f32);
@@ -106,6 +104,10 @@ impl MotionDatabase {
             proportions: proportions(clip.motion.skeleton()),
         });
         Ok(())
+    }
+
+    pub(crate) fn check_size(&self, poses: usize) -> Result<()> {
+        if poses > MAX_POSES { Err(Error::TooLarge { poses, limit: MAX_POSES }) } else { Ok(()) }
     }
 }
 
@@ -190,14 +192,15 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
     u * d * vt
 }
 
-fn check_structure(clip: &Clip, first: &Clip) -> Result<()> {
-    let (skeleton, expected) = (clip.motion.skeleton(), first.motion.skeleton());
+/// Refuses a clip whose poses are none of `expected`, the skeleton of clip `first`.
+pub(crate) fn structure_mismatch(clip: &Clip, expected: &Skeleton, first: &str) -> Result<()> {
     let mismatch = |difference: String| Error::SkeletonMismatch {
         clip: clip.name.clone(),
-        first: first.name.clone(),
+        first: first.to_owned(),
         difference,
     };
-    structure_difference(skeleton, expected).map_or(Ok(()), |difference| Err(mismatch(difference)))
+    structure_difference(clip.motion.skeleton(), expected)
+        .map_or(Ok(()), |difference| Err(mismatch(difference)))
 }
 
 impl MotionDatabase {

@@ -28,6 +28,9 @@ pub enum Error {
         /// what is wrong
         source: kinematics::Error,
     },
+    /// Two parts of a database whose numbers mean different poses.
+    #[error("the parts of a motion database have different coordinates, expected those of one build")]
+    OtherCoordinates,
     /// The database would not fit in memory.
     #[error("found {poses} poses, expected at most {limit}")]
     TooLarge {

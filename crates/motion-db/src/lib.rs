@@ -12,6 +12,7 @@ mod database;
 mod error;
 mod file;
 mod frame;
+mod parts;
 mod search;
 mod start;
 mod window;
