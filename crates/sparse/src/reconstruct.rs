@@ -187,12 +187,12 @@ impl<'a> Reconstructor<'a> {
         let mut lost = 0;
         for frame in frames.clone() {
             before.copy_from(&track);
-            let mut step = tracker.step(&mut track, self.session.trajectories.frame(frame));
+            let mut step = tracker.step(&mut track, self.session.trajectories.samples(frame));
             lost = if step.energy() > self.parameters.lost_energy { lost + 1 } else { 0 };
             if lost >= self.parameters.lost_frames {
                 lost = 0;
                 track = self.start(&mut tracker, frame, Some(before.clone()))?;
-                step = tracker.step(&mut track, self.session.trajectories.frame(frame));
+                step = tracker.step(&mut track, self.session.trajectories.samples(frame));
             }
             reconstruction.coordinates.extend_from_slice(track.newest());
             reconstruction.quality.push(FrameQuality {
@@ -242,7 +242,8 @@ impl<'a> Reconstructor<'a> {
         for (part, keep) in [(first..first + ahead / 3, FINALISTS), (first + ahead / 3..first + ahead, 1)] {
             for probe in &mut probes {
                 for f in part.clone() {
-                    probe.surprise += tracker.step(&mut probe.now, trajectories.frame(f)).solution.surprise();
+                    probe.surprise +=
+                        tracker.step(&mut probe.now, trajectories.samples(f)).solution.surprise();
                 }
             }
             probes.sort_by(|a, b| a.surprise.total_cmp(&b.surprise));

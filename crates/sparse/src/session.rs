@@ -14,7 +14,7 @@ const FRAME_RATE: f64 = motion_db::FRAME_RATE;
 const MAX_POINTS: usize = 16;
 /// What is said to be farther from the origin than this (metres, in any direction) was not measured.
 const MAX_DISTANCE: f64 = 1e5;
-const MAGIC: &[u8; 8] = b"MAREYSES";
+const MAGIC: &[u8; 8] = b"MAREYSE2";
 
 /// A sparse capture session: the performer's skeleton and what was measured of them, at 60 frames a second.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +32,8 @@ struct Header {
     skeleton: SkeletonRecord,
     points: Vec<PointRecord>,
     frames: usize,
+    /// whether the samples' standard deviations follow their positions
+    has_sigmas: bool,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -53,14 +55,7 @@ impl Session {
         points: Vec<ControlPoint>,
         trajectories: &PointTrajectories,
     ) -> Result<Self> {
-        if !(2..=MAX_POINTS).contains(&points.len()) {
-            return Err(Error::PointCount { found: points.len(), max: MAX_POINTS });
-        }
-        if let Some(twice) =
-            points.iter().enumerate().find(|(i, p)| points[..*i].iter().any(|q| q.name == p.name))
-        {
-            return Err(Error::PointTwice { name: twice.1.name.clone() });
-        }
+        check_points(&points)?;
         let columns = points.iter().map(|point| {
             trajectories.point_index(&point.name).ok_or_else(|| Error::NoTrajectory {
                 name: point.name.clone(),
@@ -68,10 +63,10 @@ impl Session {
             })
         });
         let columns = columns.collect::<Result<Vec<_>>>()?;
-        let mut positions = resample(trajectories, &columns);
+        let (mut positions, sigmas) = resample(trajectories, &columns);
         forget_absurd(&mut positions);
         let names = points.iter().map(|p| p.name.clone()).collect();
-        let trajectories = PointTrajectories::new(names, FRAME_RATE, positions)?;
+        let trajectories = PointTrajectories::new(names, FRAME_RATE, positions)?.with_sigmas(sigmas)?;
         let has_enough = |frame| trajectories.frame(frame).iter().filter(|p| p.x.is_finite()).count() >= 2;
         if !(0..trajectories.num_frames()).any(has_enough) {
             return Err(Error::NothingMeasured { frames: trajectories.num_frames() });
@@ -95,6 +90,7 @@ impl Session {
                 .map(|p| PointRecord { name: p.name.clone(), joint: p.joint, offset_m: p.offset.into() })
                 .collect(),
             frames: self.num_frames(),
+            has_sigmas: self.trajectories.has_sigmas(),
         };
         let mut writer = Writer::new(MAGIC, &header);
         for frame in 0..self.num_frames() {
@@ -102,6 +98,7 @@ impl Session {
                 writer.numbers(position.as_slice());
             }
         }
+        writer.numbers(self.trajectories.sigmas());
         writer.finish()
     }
 
@@ -121,14 +118,27 @@ impl Session {
         if let Some(bad) = points.iter().find(|p| p.joint >= skeleton.num_joints()) {
             return Err(Error::Bytes { what, found: format!("point {} on joint {}", bad.name, bad.joint) });
         }
-        let count = header.frames.checked_mul(points.len()).and_then(|n| n.checked_mul(3));
-        let numbers = reader.numbers(count)?;
+        check_points(&points)?;
+        let count = header.frames.checked_mul(points.len());
+        let numbers = reader.numbers(count.and_then(|n| n.checked_mul(3)))?;
+        let sigmas = if header.has_sigmas { reader.numbers(count)? } else { Vec::new() };
         reader.end()?;
         let mut positions: Vec<_> = numbers.as_chunks::<3>().0.iter().map(|p| Vector3::from(*p)).collect();
         forget_absurd(&mut positions);
         let names = points.iter().map(|p| p.name.clone()).collect();
-        let trajectories = PointTrajectories::new(names, FRAME_RATE, positions)?;
+        let trajectories = PointTrajectories::new(names, FRAME_RATE, positions)?.with_sigmas(sigmas)?;
         Ok(Self { skeleton: skeleton.into(), points, trajectories })
+    }
+}
+
+fn check_points(points: &[ControlPoint]) -> Result<()> {
+    if !(2..=MAX_POINTS).contains(&points.len()) {
+        return Err(Error::PointCount { found: points.len(), max: MAX_POINTS });
+    }
+    let is_second = |(i, p): &(usize, &ControlPoint)| points[..*i].iter().any(|q| q.name == p.name);
+    match points.iter().enumerate().find(is_second) {
+        Some((_, twice)) => Err(Error::PointTwice { name: twice.name.clone() }),
+        None => Ok(()),
     }
 }
 
@@ -160,30 +170,39 @@ fn check_unit(skeleton: &Skeleton, trajectories: &PointTrajectories) -> Result<(
     Ok(())
 }
 
-fn resample(trajectories: &PointTrajectories, columns: &[usize]) -> Vec<Vector3<f64>> {
+/// Positions and standard deviations of `columns` at 60 frames a second; no standard deviations where none is known.
+fn resample(trajectories: &PointTrajectories, columns: &[usize]) -> (Vec<Vector3<f64>>, Vec<f64>) {
     let ratio = trajectories.frame_rate() / FRAME_RATE;
     let whole = ratio.round();
+    let is_whole = whole >= 1.0 && (ratio - whole).abs() < 0.01 * whole;
+    let step = if is_whole { whole } else { ratio };
     let frames = trajectories.num_frames();
-    if whole >= 1.0 && (ratio - whole).abs() < 0.01 * whole {
-        let picked = (0..frames).step_by(whole as usize);
-        return picked.flat_map(|f| columns.iter().map(move |&c| trajectories.frame(f)[c])).collect();
-    }
-    if frames == 0 {
-        return Vec::new();
-    }
-    let duration = (frames - 1) as f64 / trajectories.frame_rate();
-    let count = (duration * FRAME_RATE + 1e-9).floor() as usize + 1;
-    let mut out = Vec::with_capacity(count * columns.len());
+    let Some(last) = frames.checked_sub(1) else { return (Vec::new(), Vec::new()) };
+    let count = (last as f64 / step + 1e-9).floor() as usize + 1;
+    let mut positions = Vec::with_capacity(count * columns.len());
+    let mut sigmas = Vec::with_capacity(if trajectories.has_sigmas() { positions.capacity() } else { 0 });
     for frame in 0..count {
-        let at = frame as f64 * ratio;
-        let low = (at.floor() as usize).min(frames - 1);
-        let high = (low + 1).min(frames - 1);
+        let at = frame as f64 * step;
+        let low = (at.floor() as usize).min(last);
         let share = at - low as f64;
+        // A sample that falls on a measured frame does not need the next one.
+        let (high, share) = if share < 1e-6 { (low, 0.0) } else { ((low + 1).min(last), share) };
+        let (a, b) = (trajectories.samples(low), trajectories.samples(high));
         for &c in columns {
-            let (a, b) = (trajectories.frame(low)[c], trajectories.frame(high)[c]);
-            // A sample that falls on a measured frame does not need the next one.
-            out.push(if share < 1e-6 { a } else { a + (b - a) * share });
+            positions.push(a.positions[c] + (b.positions[c] - a.positions[c]) * share);
+            if trajectories.has_sigmas() {
+                sigmas.push(between(a.sigma(c), b.sigma(c), share));
+            }
         }
     }
-    out
+    (positions, sigmas)
+}
+
+/// Errors of neighbouring samples are alike, so their standard deviations are not averaged down. A known one stands for
+/// an unknown neighbour; NaN where both are unknown.
+fn between(a: Option<f64>, b: Option<f64>, share: f64) -> f64 {
+    match (a, b) {
+        (Some(a), Some(b)) => a + (b - a) * share,
+        (known, other) => known.or(other).unwrap_or(f64::NAN),
+    }
 }

@@ -1,6 +1,7 @@
 use std::ops::Range;
 
 use kinematics::Kinematics;
+use model::Samples;
 use motion_db::{
     ControlTable, HeadingFrame, MotionDatabase, Neighbour, Query, Scratch, SkeletonSize, StartPose,
     WindowIndex,
@@ -11,6 +12,14 @@ use regression::{LocalRegression, NearestExample, Prediction, Predictor};
 
 use crate::examples::ExampleBuffer;
 use crate::{Covariance, Method, Parameters, Reconstructor};
+
+/// Standard deviations of samples are taken into this range, metres: beyond it the solver's arithmetic ends.
+const MIN_SIGMA_M: f64 = 1e-5;
+const MAX_SIGMA_M: f64 = 1e3;
+/// Standard deviation of a sample, metres, up to which it counts in full in the search and the regression; beyond, its
+/// weight falls with the inverse. Neighbours are a few degrees away, which one centimetre of a control point is compared
+/// with: two of noise do not lead the search astray.
+const SEARCH_SIGMA_M: f64 = 0.02;
 
 /// What is known of the person at a frame: the last m poses, newest first, in world coordinates (metres, radians,
 /// the performer's scale), and the rows that matched last.
@@ -149,9 +158,8 @@ impl<'a> Tracker<'a> {
         Track { history: (1..=self.parameters.window).map(placed).collect(), matches: Vec::new() }
     }
 
-    /// Takes `track` one frame further with the measured positions of that frame (metres, world; NaN where not
-    /// measured).
-    pub fn step(&mut self, track: &mut Track, measured: &[Vector3<f64>]) -> Step {
+    /// Takes `track` one frame further with what was measured in that frame.
+    pub fn step(&mut self, track: &mut Track, measured: Samples<'_>) -> Step {
         let frame = HeadingFrame::of(track.newest());
         self.measure(&frame, measured);
         self.find_neighbours(track);
@@ -191,15 +199,16 @@ impl<'a> Tracker<'a> {
     }
 
     /// Brings the measurements into the heading frame, for the solver and for the search.
-    fn measure(&mut self, frame: &HeadingFrame, measured: &[Vector3<f64>]) {
+    fn measure(&mut self, frame: &HeadingFrame, samples: Samples<'_>) {
         let floor = Vector3::new(self.root_offset.x, 0.0, self.root_offset.z);
-        let weight = self.parameters.control_weight;
-        for (p, world) in measured.iter().enumerate() {
+        for (p, world) in samples.positions.iter().enumerate() {
             let is_measured = world.x.is_finite();
             let local = if is_measured { frame.local_from_world(&(world - floor)) } else { Vector3::zeros() };
-            self.measured[p] = is_measured
-                .then(|| Measurement { position: local + floor, sigma: self.parameters.control_sigma_m });
-            let factor = if is_measured { weight } else { 0.0 };
+            let sigma = samples.sigma(p).unwrap_or(self.parameters.control_sigma_m);
+            let sigma = sigma.clamp(MIN_SIGMA_M, MAX_SIGMA_M);
+            self.measured[p] = is_measured.then(|| Measurement { position: local + floor, sigma });
+            let trust = if is_measured { (SEARCH_SIGMA_M / sigma).min(1.0) } else { 0.0 };
+            let factor = trust * self.parameters.control_weight;
             for i in 0..3 {
                 self.controls[3 * p + i] = (local[i] * 100.0) as f32;
                 self.control_weights[3 * p + i] = (factor * factor) as f32;

@@ -30,6 +30,40 @@ fn a_session_comes_back_bit_for_bit() {
 }
 
 #[test]
+fn a_session_keeps_how_sure_its_samples_are() {
+    let mut session = short_session();
+    let count = session.num_frames() * session.points.len();
+    let sigmas = (0..count).map(|i| if i % 3 == 0 { f64::NAN } else { 0.001 * i as f64 }).collect();
+    session.trajectories = session.trajectories.with_sigmas(sigmas).unwrap();
+    let bytes = session.to_bytes();
+    let back = Session::from_bytes(&bytes).unwrap();
+    assert_eq!(back.to_bytes(), bytes);
+    assert_eq!(back.trajectories.sigma(0, 0), None);
+    assert_eq!(back.trajectories.sigma(1, 1), Some(0.007));
+    let at = bytes.len() - 8;
+    for bad in [0.0, -1.0, f64::INFINITY] {
+        let mut changed = bytes.clone();
+        changed[at..].copy_from_slice(&f64::to_le_bytes(bad));
+        let error = Session::from_bytes(&changed).unwrap_err().to_string();
+        assert!(error.contains("expected a positive number"), "{error}");
+    }
+    assert!(Session::from_bytes(&bytes[..at]).is_err());
+}
+
+#[test]
+fn a_session_of_one_point_or_of_a_point_twice_is_refused() {
+    let session = short_session();
+    let mut alone = session.clone();
+    alone.points.truncate(1);
+    let message = Session::from_bytes(&alone.to_bytes()).unwrap_err().to_string();
+    assert!(message.contains('1') && message.contains("16"), "{message}");
+    let mut twice = session;
+    twice.points[1].name = twice.points[0].name.clone();
+    let message = Session::from_bytes(&twice.to_bytes()).unwrap_err().to_string();
+    assert!(message.contains("left_wrist"), "{message}");
+}
+
+#[test]
 fn a_reconstruction_comes_back_bit_for_bit() {
     let found = short_reconstruction();
     let back = Reconstruction::from_bytes(&found.to_bytes()).unwrap();
@@ -90,15 +124,18 @@ fn headers_that_claim_too_much_take_no_memory() {
     }
     let text = String::from_utf8_lossy(&short_session().to_bytes()).into_owned();
     let start = text.find('{').unwrap();
-    let end = text.find("\"frames\":40}").unwrap();
+    let end = text.find("\"frames\":40,").unwrap();
     for frames in ["18446744073709551615", "768614336404564651", "1000000000"] {
-        let bytes = with_header("MAREYSES", &format!("{}\"frames\":{frames}}}", &text[start..end]));
+        let bytes = with_header(
+            "MAREYSE2",
+            &format!("{}\"frames\":{frames},\"has_sigmas\":true}}", &text[start..end]),
+        );
         let counted = allocation_counter::measure(|| {
             assert!(Session::from_bytes(&bytes).is_err());
         });
         assert!(counted.bytes_max < 20 * bytes.len() as u64, "{counted:?}");
     }
-    let mut no_header = b"MAREYSES".to_vec();
+    let mut no_header = b"MAREYSE2".to_vec();
     no_header.extend_from_slice(&u32::MAX.to_le_bytes());
     assert!(Session::from_bytes(&no_header).is_err());
 }
