@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    cmu, connection::Server, database, demo, evaluate, health, keys, results, run, sample, serve, status, up,
-    upload,
+    bench, cmu, connection::Server, database, demo, evaluate, health, keys, results, run, sample, serve,
+    status, up, upload,
 };
 
 /// Full-body motion from a few control points.
@@ -46,6 +46,8 @@ enum Command {
     Cancel(status::CancelArgs),
     /// Measure how well motion is reconstructed, on recordings of your own
     Evaluate(evaluate::Args),
+    /// Measure how fast the parts are, on recordings of your own
+    Bench(bench::Args),
     Sample(sample::Args),
     /// Get recorded motion from public collections
     #[command(subcommand)]
@@ -77,6 +79,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Status(args) => status::run(&args),
         Command::Cancel(args) => status::cancel(&args),
         Command::Evaluate(args) => evaluate::run(args),
+        Command::Bench(args) => bench::run(args),
         Command::Sample(args) => sample::run(&args),
         Command::Data(Data::Cmu(args)) => cmu::run(&args),
         Command::Serve(service) => serve::run(&service),

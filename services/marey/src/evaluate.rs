@@ -1,6 +1,6 @@
 //! `marey evaluate`: how far reconstructions are from the truth.
 
-mod motions;
+pub(crate) mod motions;
 mod papers;
 mod sparse_command;
 

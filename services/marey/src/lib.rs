@@ -2,6 +2,7 @@
 //!
 //! The program is a library so that tests can start it as a process of its own.
 
+mod bench;
 mod cli;
 mod client;
 mod cmu;

@@ -1,0 +1,23 @@
+//! `marey bench`: how fast the parts are, on motion of your own.
+
+mod search;
+
+/// `marey bench`
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Search windows of held-out motion in a database: exact beside fast
+    Search(Box<search::Args>),
+}
+
+/// Runs `marey bench`.
+pub fn run(args: Args) -> anyhow::Result<()> {
+    match args.what {
+        What::Search(args) => search::run(&args),
+    }
+}
