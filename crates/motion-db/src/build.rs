@@ -13,7 +13,7 @@ const MIN_FRAMES: usize = 8;
 const MAX_POSES: usize = 8_000_000;
 
 /// A recorded motion to be indexed.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Clip {
     /// name, `16_15`
     pub name: String,

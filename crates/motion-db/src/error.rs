@@ -31,6 +31,22 @@ pub enum Error {
     /// Two parts of a database whose numbers mean different poses.
     #[error("the parts of a motion database have different coordinates, expected those of one build")]
     OtherCoordinates,
+    /// A skeleton whose left and right are no mirror images.
+    #[error("joint {joint} cannot be mirrored: {reason}")]
+    Mirror {
+        /// the joint
+        joint: String,
+        /// what is wrong
+        reason: String,
+    },
+    /// A speed that motion cannot be played at.
+    #[error("speed is {found}, expected 1/{max} to {max} times the recorded one")]
+    Speed {
+        /// speed asked for
+        found: f64,
+        /// largest
+        max: f64,
+    },
     /// The database would not fit in memory.
     #[error("found {poses} poses, expected at most {limit}")]
     TooLarge {

@@ -6,25 +6,31 @@
 //! - [`ControlTable`]: where a session's control points would be in every pose of the database.
 //! - [`start_poses`]: the poses whose control points fit the first frames of a session best.
 
+mod augment;
 mod build;
 mod controls;
 mod database;
 mod error;
 mod file;
 mod frame;
+mod mirror;
 mod parts;
 mod search;
 mod start;
+mod start_scan;
 mod window;
 
+pub use augment::{Augment, trial_of, warp};
 pub use build::{Clip, SkeletonSize, resample};
 pub use controls::ControlTable;
 pub use database::{ClipInfo, FRAME_RATE, MotionDatabase};
 pub use error::Error;
 pub use file::FORMAT_VERSION;
 pub use frame::HeadingFrame;
+pub use mirror::mirror;
 pub use search::{Neighbour, Query, Scratch};
 pub use start::{StartPose, start_poses};
+pub use start_scan::StartScan;
 pub use window::{FeatureScale, WindowIndex};
 
 /// Result of the fallible functions of this crate.

@@ -18,7 +18,7 @@ pub struct StartPose {
 }
 
 /// Two starts of the same clip nearer than this (frames) are one.
-const DISTINCT_FRAMES: usize = 6;
+pub(crate) const DISTINCT_FRAMES: usize = 6;
 
 /// Finds the database poses from which the session may have started (method §2, mend 8): those whose control points
 /// over the frames `offsets` fit the observed ones best, after the best turn about y and shift on the floor.
@@ -69,7 +69,7 @@ pub fn start_poses(
 }
 
 /// Best turn and shift of one pose: Procrustes in the plane, heights compared as they are.
-fn fit(
+pub(crate) fn fit(
     table: &ControlTable,
     pose: usize,
     offsets: &[usize],
