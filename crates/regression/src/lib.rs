@@ -4,6 +4,7 @@
 //! query, and gives a Gaussian over the next pose: a mean and the factor of a covariance.
 //!
 //! - [`LocalRegression`]: weighted ridge regression in its dual form, leave-one-out residuals (LR eq. 4–10, mended).
+//! - [`gplvm`]: a global latent variable model, trained offline.
 //! - [`NearestExample`]: the successor of the nearest window; the plain baseline.
 //!
 //! ```
@@ -16,10 +17,16 @@
 //! assert!((prediction.mean[0] - 3.0).abs() < 1e-3);
 //! ```
 
+mod error;
+pub mod gplvm;
 mod local;
 mod nearest;
 mod prediction;
 
+pub use error::Error;
 pub use local::LocalRegression;
 pub use nearest::NearestExample;
 pub use prediction::{Examples, Parameters, Prediction, Predictor, Query, kernel_weights};
+
+/// Result of the fallible functions of this crate.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -14,15 +14,7 @@ impl Predictor for NearestExample {
         parameters: &Parameters,
         out: &mut Prediction,
     ) {
-        if examples.is_empty() {
-            return;
-        }
-        let nearest = examples
-            .distances_squared
-            .iter()
-            .enumerate()
-            .min_by(|a, b| a.1.total_cmp(b.1))
-            .map_or(0, |(k, _)| k);
+        let Some(nearest) = examples.nearest() else { return };
         out.rows = examples.len();
         out.sigma.fill(parameters.min_sigma);
         kernel_weights(examples.distances_squared, parameters.bandwidth, &mut out.weights);

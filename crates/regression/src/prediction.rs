@@ -24,6 +24,12 @@ impl Examples<'_> {
         self.distances_squared.is_empty()
     }
 
+    /// The example nearest to the query, the first of several; `None` if there is none.
+    pub fn nearest(&self) -> Option<usize> {
+        let distances = self.distances_squared.iter().enumerate();
+        distances.min_by(|a, b| a.1.total_cmp(b.1)).map(|(k, _)| k)
+    }
+
     /// Target of example `k`, shape `[dofs]`.
     pub fn target(&self, k: usize) -> &[f64] {
         &self.targets[k * self.dofs..(k + 1) * self.dofs]
