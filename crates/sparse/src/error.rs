@@ -89,6 +89,14 @@ pub enum Error {
         /// what was found
         found: String,
     },
+    /// A live state that cannot be gone on with.
+    #[error("live state is {found}, expected {expected}")]
+    LiveState {
+        /// what was found
+        found: String,
+        /// what would do
+        expected: String,
+    },
     /// Chunks that do not make up the session.
     #[error("chunks end at frame {found}, expected frame {expected}")]
     Chunks {

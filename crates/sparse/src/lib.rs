@@ -7,12 +7,14 @@
 //! - [`Session`]: skeleton, control points and their trajectories at 60 frames a second.
 //! - [`Parameters`]: everything a run can choose, each with a default.
 //! - [`Reconstructor`]: the frame loop over a range of frames, with start and re-entry.
+//! - [`Live`]: the same for frames that come one by one, now.
 //! - [`plan_chunks`], [`merge`]: long sessions cut for many workers and put together again.
 
 mod bytes;
 mod chunks;
 mod error;
 mod examples;
+mod live;
 mod parameters;
 mod reconstruct;
 mod session;
@@ -21,8 +23,9 @@ mod tracker;
 pub use chunks::{Chunk, Merged, merge, plan_chunks};
 pub use error::Error;
 pub use kinematics::{ControlPoint, control_points};
+pub use live::{Live, LivePose, MAX_LIVE_STATE_BYTES};
 pub use parameters::{Covariance, Method, Parameters};
-pub use reconstruct::{FrameQuality, Reconstruction, Reconstructor};
+pub use reconstruct::{FrameQuality, Reconstruction, Reconstructor, control_table};
 pub use session::Session;
 
 /// Result of the fallible functions of this crate.

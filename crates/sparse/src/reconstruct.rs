@@ -1,4 +1,5 @@
 use std::ops::{ControlFlow, Range};
+use std::sync::Arc;
 
 use kinematics::{Kinematics, PointSet};
 use motion_db::{ControlTable, MotionDatabase, WindowIndex, start_poses};
@@ -104,7 +105,7 @@ pub struct Reconstructor<'a> {
     pub(crate) parameters: &'a Parameters,
     pub(crate) kinematics: Kinematics,
     pub(crate) points: PointSet,
-    pub(crate) table: std::sync::Arc<ControlTable>,
+    pub(crate) table: Arc<ControlTable>,
     /// windows and poses that may not be used, in rising order
     pub(crate) exclude_rows: Vec<Range<usize>>,
     pub(crate) exclude_poses: Vec<Range<usize>>,
@@ -123,10 +124,28 @@ impl<'a> Reconstructor<'a> {
         session: &'a Session,
         parameters: &'a Parameters,
     ) -> Result<Self> {
+        Self::with_table(
+            database,
+            index,
+            session,
+            parameters,
+            control_table(database, index, session)?.into(),
+        )
+    }
+
+    /// As [`Self::new`], with the [`control_table`] of the same database, index and session made before.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_table(
+        database: &'a MotionDatabase,
+        index: &'a WindowIndex,
+        session: &'a Session,
+        parameters: &'a Parameters,
+        table: Arc<ControlTable>,
+    ) -> Result<Self> {
         parameters.check()?;
-        if let Some(difference) = database.structure_difference(&session.skeleton) {
-            return Err(Error::Skeleton { difference });
-        }
+        check_structure(database, session)?;
         if index.window() != parameters.window {
             return Err(Error::Parameter {
                 name: "window",
@@ -136,7 +155,6 @@ impl<'a> Reconstructor<'a> {
         }
         let kinematics = database.kinematics(&session.skeleton);
         let points = PointSet::new(&kinematics, session.points.clone());
-        let table = ControlTable::new(database, index, &session.skeleton, &kinematics, &points).into();
         Ok(Self {
             database,
             index,
@@ -250,5 +268,28 @@ impl<'a> Reconstructor<'a> {
             probes.truncate(keep);
         }
         probes.into_iter().next().map(|probe| probe.start).ok_or(Error::NoStart { frame })
+    }
+}
+
+/// Where the control points of `session` would be in every pose of the database (about 3 µs a pose). Sessions of the same
+/// skeleton and points may share it.
+///
+/// # Errors
+/// If the session's skeleton has another structure than the database's.
+pub fn control_table(
+    database: &MotionDatabase,
+    index: &WindowIndex,
+    session: &Session,
+) -> Result<ControlTable> {
+    check_structure(database, session)?;
+    let kinematics = database.kinematics(&session.skeleton);
+    let points = PointSet::new(&kinematics, session.points.clone());
+    Ok(ControlTable::new(database, index, &session.skeleton, &kinematics, &points))
+}
+
+fn check_structure(database: &MotionDatabase, session: &Session) -> Result<()> {
+    match database.structure_difference(&session.skeleton) {
+        Some(difference) => Err(Error::Skeleton { difference }),
+        None => Ok(()),
     }
 }

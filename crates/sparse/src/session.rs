@@ -75,6 +75,17 @@ impl Session {
         Ok(Self { skeleton, points, trajectories })
     }
 
+    /// A session whose frames are yet to come: skeleton and points of a live stream.
+    ///
+    /// # Errors
+    /// If there are fewer than 2 or more than 16 points, or one of them twice.
+    pub fn without_frames(skeleton: Arc<Skeleton>, points: Vec<ControlPoint>) -> Result<Self> {
+        check_points(&points)?;
+        let names = points.iter().map(|p| p.name.clone()).collect();
+        let trajectories = PointTrajectories::new(names, FRAME_RATE, Vec::new())?;
+        Ok(Self { skeleton, points, trajectories })
+    }
+
     /// Number of frames at 60 a second.
     pub fn num_frames(&self) -> usize {
         self.trajectories.num_frames()

@@ -25,11 +25,19 @@ const SEARCH_SIGMA_M: f64 = 0.02;
 /// the performer's scale), and the rows that matched last.
 #[derive(Debug, Clone)]
 pub struct Track {
-    history: Vec<Vec<f64>>,
-    matches: Vec<usize>,
+    pub history: Vec<Vec<f64>>,
+    pub matches: Vec<usize>,
 }
 
 impl Track {
+    /// Room for a track under `parameters`; it stands nowhere yet.
+    pub fn blank(dofs: usize, parameters: &Parameters) -> Self {
+        Self {
+            history: vec![vec![0.0; dofs]; parameters.window],
+            matches: Vec::with_capacity(parameters.neighbours),
+        }
+    }
+
     pub fn newest(&self) -> &[f64] {
         &self.history[0]
     }
@@ -142,20 +150,25 @@ impl<'a> Tracker<'a> {
 
     /// A track that stands where a start pose of the database was put.
     pub fn track_from(&self, start: &StartPose) -> Track {
-        let placed = |back: usize| {
-            let mut pose = vec![0.0; self.database.num_dofs()];
-            self.database.copy_pose(start.pose - back, &mut pose);
+        let mut track = Track::blank(self.database.num_dofs(), self.parameters);
+        self.place(start, &mut track);
+        track
+    }
+
+    /// Makes `track` stand where a start pose of the database was put.
+    pub fn place(&self, start: &StartPose, track: &mut Track) {
+        // The shift was found for points, which hang from the root's offset.
+        let turned = HeadingFrame::new(0.0, 0.0, start.turn);
+        for (back, pose) in track.history.iter_mut().enumerate() {
+            self.database.copy_pose(start.pose - 1 - back, pose);
             pose[..3].iter_mut().for_each(|v| *v /= self.scale);
-            // The shift was found for points, which hang from the root's offset.
-            let turned = HeadingFrame::new(0.0, 0.0, start.turn);
             let root = Vector3::new(pose[0], 0.0, pose[2]) + self.root_offset;
             let root = turned.world_from_local(&root) - self.root_offset;
             pose[0] = root.x + start.shift[0];
             pose[2] = root.z + start.shift[1];
             pose[kinematics::HEADING] += start.turn;
-            pose
-        };
-        Track { history: (1..=self.parameters.window).map(placed).collect(), matches: Vec::new() }
+        }
+        track.matches.clear();
     }
 
     /// Takes `track` one frame further with what was measured in that frame.
