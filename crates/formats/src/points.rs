@@ -11,11 +11,23 @@ use crate::{
 };
 
 /// What a file of points may not say.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointsOptions {
     /// the axis of the file that points up; by default what the file says, else Y for TRC and Z for C3D
     pub up: Option<Axis>,
+    /// standard deviation of a sample of full confidence, metres (default 0.0015): what a confidence divides, and the
+    /// least residual that is taken for a standard deviation
+    pub sigma_m: f64,
 }
+
+impl Default for PointsOptions {
+    fn default() -> Self {
+        Self { up: None, sigma_m: 0.0015 }
+    }
+}
+
+/// A standard deviation above this says nothing of where on earth a point is: it was not measured. Metres.
+pub(crate) const MAX_SIGMA: f64 = 1e3;
 
 /// Point of a file whose `up` axis points up, in the world, where y does. The rotation is z up: `(x, z, -y)`;
 /// x up: `(z, x, y)`.
@@ -72,14 +84,25 @@ pub(crate) fn max_frames(file_bytes: usize, points: usize) -> usize {
     (file_bytes.saturating_add(FREE)) / points.max(1)
 }
 
-/// Rows of samples, shape `[rows, points]`, placed in the frames of the grid.
-pub(crate) fn place(names: Vec<String>, rows: &[Vector3<f64>], grid: &Grid) -> Result<PointTrajectories> {
+/// Rows of samples, shape `[rows, points]`, placed in the frames of the grid; `sigmas` of the same shape, or none.
+pub(crate) fn place(
+    names: Vec<String>,
+    rows: &[Vector3<f64>],
+    sigmas: &[f64],
+    grid: &Grid,
+) -> Result<PointTrajectories> {
     let points = names.len();
-    let mut positions = vec![Vector3::repeat(f64::NAN); grid.num_frames() * points];
+    let positions = placed(rows, points, grid, Vector3::repeat(f64::NAN));
+    let sigmas = if sigmas.is_empty() { Vec::new() } else { placed(sigmas, points, grid, f64::NAN) };
+    Ok(PointTrajectories::new(names, grid.rate, positions)?.with_sigmas(sigmas)?)
+}
+
+fn placed<T: Copy>(rows: &[T], points: usize, grid: &Grid, missing: T) -> Vec<T> {
+    let mut frames = vec![missing; grid.num_frames() * points];
     for (row, frame) in rows.chunks_exact(points).zip(&grid.frames) {
-        positions[frame * points..(frame + 1) * points].copy_from_slice(row);
+        frames[frame * points..(frame + 1) * points].copy_from_slice(row);
     }
-    Ok(PointTrajectories::new(names, grid.rate, positions)?)
+    frames
 }
 
 #[cfg(test)]

@@ -52,7 +52,7 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
     }
     header.check_rows(rows.positions.len() / points, &mut warnings);
     let grid = rows.times.grid(header.rate, max_frames, &mut warnings)?;
-    let trajectories = points::place(header.names, &rows.positions, &grid)?;
+    let trajectories = points::place(header.names, &rows.positions, &[], &grid)?;
     Ok(warnings.beside(trajectories))
 }
 

@@ -44,7 +44,10 @@ fn heads_are_above_feet() {
         ("ktk_wheelchair_racing.c3d", "Head1", "WheelchairFront", Some(Axis::Y)),
     ];
     for (name, head, foot, up) in cases {
-        let points = c3d::read(&testdata::read(&folder, name), &PointsOptions { up }).unwrap().value;
+        let points =
+            c3d::read(&testdata::read(&folder, name), &PointsOptions { up, ..PointsOptions::default() })
+                .unwrap()
+                .value;
         let mean_height = |label: &str| {
             let point = points.point_index(label).unwrap_or_else(|| panic!("{name}: {:?}", points.names()));
             let heights: Vec<f64> =
@@ -61,7 +64,7 @@ fn heads_are_above_feet() {
 #[test]
 fn a_trial_is_the_same_from_c3d_and_from_trc() {
     let Some(folder) = testdata::shared(MARKERS, "a_trial_is_the_same_from_c3d_and_from_trc") else { return };
-    let options = PointsOptions { up: Some(Axis::Z) };
+    let options = PointsOptions { up: Some(Axis::Z), ..PointsOptions::default() };
     let binary =
         c3d::read(&testdata::read(&folder, "opensim_walking2.c3d"), &PointsOptions::default()).unwrap();
     let text = trc::read(&testdata::read(&folder, "opensim_walking2_markers.trc"), &options).unwrap();
@@ -200,6 +203,23 @@ fn all_processors_and_both_kinds_of_data_are_read_alike() {
             assert!((points.position(0, 1).unwrap() - Vector3::new(0.01, 0.03, -0.02)).norm() < 1e-6);
         }
     }
+}
+
+/// The residual of the made files is one step of their scale, their unit is the centimetre.
+#[test]
+fn residuals_are_standard_deviations_where_they_can_be() {
+    for processor in [84, 85, 86] {
+        for scale in [-0.5, 0.5] {
+            let points = Made::new(processor, scale).read().value;
+            assert!((points.sigma(0, 0).unwrap() - 0.005).abs() < 1e-9, "{processor} {scale}");
+            assert_eq!(points.sigma(1, 1), None);
+        }
+    }
+    let made = Made::new(84, -0.5).bytes();
+    let careless = PointsOptions { sigma_m: 0.006, ..PointsOptions::default() };
+    assert!(!c3d::read(&made, &careless).unwrap().value.has_sigmas());
+    // a metre and a half is no residual
+    assert!(!Made::new(84, -150.0).read().value.has_sigmas());
 }
 
 #[test]

@@ -8,7 +8,8 @@ use model::{Axis, PointTrajectories};
 const MARKERS: &str = "data/markers";
 
 fn read_trc(folder: &Path, name: &str, up: Option<Axis>) -> (PointTrajectories, Vec<String>) {
-    let read = trc::read(&testdata::read(folder, name), &PointsOptions { up }).unwrap();
+    let read =
+        trc::read(&testdata::read(folder, name), &PointsOptions { up, ..PointsOptions::default() }).unwrap();
     (read.value, read.warnings.iter().map(ToString::to_string).collect())
 }
 
@@ -163,6 +164,60 @@ fn damaged_csv_is_refused_with_its_line() {
     }
 }
 
+#[test]
+fn csv_says_how_sure_samples_are() {
+    let points = csv("time,a_x,a_y,a_z,a_sigma,b_Confidence,b_x,b_y,b_z,c_x,c_y,c_z,c_sigma,c_confidence\n\
+                      0,1,2,3,0.02,1,1,2,3,1,2,3,0.01,0.5\n\
+                      0.1,1,2,3,,0.25,1,2,3,1,2,3,,\n\
+                      0.2,1,2,3,nan,0,1,2,3,1,2,3,0.01,1e-9\n");
+    let sigmas = |point| [0, 1, 2].map(|frame| points.sigma(frame, point));
+    assert_eq!(sigmas(0), [Some(0.02), None, None]);
+    assert_eq!(sigmas(1), [None, Some(0.006), None]);
+    assert_eq!(sigmas(2), [Some(0.02), None, None]);
+    let measured = |point| [0, 1, 2].map(|frame| points.position(frame, point).is_some());
+    assert_eq!(
+        (measured(0), measured(1), measured(2)),
+        ([true; 3], [true, true, false], [true, true, false])
+    );
+
+    let written = points_csv::write(&points);
+    assert!(written.contains("time,a_x,a_y,a_z,a_sigma,b_x,b_y,b_z,b_sigma,c_x"), "{written}");
+    let again = csv(&written);
+    for frame in 0..3 {
+        for point in 0..3 {
+            assert_eq!(again.sigma(frame, point), points.sigma(frame, point));
+            assert_eq!(again.position(frame, point), points.position(frame, point));
+        }
+    }
+    assert!(!points_csv::write(&csv(CSV)).contains("sigma"));
+}
+
+#[test]
+fn a_full_confidence_is_worth_what_the_options_say() {
+    let text = "time,a_x,a_y,a_z,a_confidence\n0,1,2,3,0.5\n0.1,1,2,3,1\n";
+    let options = PointsOptions { sigma_m: 0.01, ..PointsOptions::default() };
+    let points = points_csv::read_with(text.as_bytes(), &options).unwrap().value;
+    assert_eq!((points.sigma(0, 0), points.sigma(1, 0)), (Some(0.02), None));
+}
+
+#[test]
+fn sigmas_and_confidences_that_make_no_sense_are_refused_with_the_line() {
+    let text = |column: &str, cell: &str| format!("time,a_x,a_y,a_z,{column}\n0,1,2,3,\n0.1,1,2,3,{cell}\n");
+    for cell in ["0", "-0.01", "x", "inf", "-0"] {
+        let error = csv_error(&text("a_sigma", cell));
+        assert!(error.starts_with(&format!("line 3: found \"{cell}\"")), "{error}");
+    }
+    for cell in ["1.01", "-0.1", "x", "inf"] {
+        let error = csv_error(&text("a_confidence", cell));
+        assert!(error.starts_with(&format!("line 3: found \"{cell}\"")), "{error}");
+    }
+    let error = csv_error(&text("b_sigma", "1"));
+    assert!(error.starts_with("line 1: found point \"b\" without three coordinates"), "{error}");
+    let error = csv_error(&text("a_sigma,a_sigma", "1,1"));
+    assert!(error.starts_with("line 1: found column \"a_sigma\" twice"), "{error}");
+    assert!(csv_error(&text("_sigma", "1")).starts_with("line 1: found column \"_sigma\""));
+}
+
 const TRC: &str = "PathFileType\t4\t(X/Y/Z)\tx.trc
 DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate
  100.0\t100\t3\t2\tcm\t100
@@ -176,7 +231,8 @@ Frame#\tTime\tleft hand\t\t\tfoot
 
 #[test]
 fn units_names_with_blanks_and_trailing_tabs_are_read() {
-    let read = trc::read(TRC.as_bytes(), &PointsOptions { up: Some(Axis::Z) }).unwrap();
+    let read =
+        trc::read(TRC.as_bytes(), &PointsOptions { up: Some(Axis::Z), ..PointsOptions::default() }).unwrap();
     let points = read.value;
     assert_eq!(points.names(), ["left hand", "foot"]);
     let hand = points.position(0, 0).unwrap();

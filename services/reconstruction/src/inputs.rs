@@ -165,7 +165,7 @@ fn read_points(
 ) -> Result<PointTrajectories, InputError> {
     let in_file = |source| InputError::File { file: file.name.clone(), source };
     let read = match kind(&file.name).as_str() {
-        "csv" => points_csv::read(&file.bytes),
+        "csv" => points_csv::read_with(&file.bytes, &reading.points),
         "trc" => formats::trc::read(&file.bytes, &reading.points),
         "c3d" => formats::c3d::read(&file.bytes, &reading.points),
         _ => return Err(kind_error(file, "control-points", "a CSV, TRC or C3D file")),

@@ -43,7 +43,7 @@ impl PlanSparse {
     /// How the session's files are to be read.
     pub(crate) fn reading(&self) -> Reading {
         Reading {
-            points: PointsOptions { up: self.up },
+            points: PointsOptions { up: self.up, sigma_m: self.parameters.control_sigma_m },
             bvh: BvhOptions { metres_per_unit: self.bvh_metres_per_unit },
         }
     }

@@ -14,10 +14,14 @@ use crate::{
 use header::Header;
 use parameters::Parameters;
 
+/// Residuals above this are not believed: cameras don't err so, but files with arbitrary scales say it. Metres.
+const MAX_RESIDUAL: f64 = 0.1;
+
 /// Reads marker trajectories; analog channels are skipped.
 ///
 /// Samples with a negative residual, that are not finite, or at exactly 0 0 0 are missing. Up is the axis of
-/// `POINT:Y_SCREEN` (its sign is not: files with z up say `-Z` too), else z.
+/// `POINT:Y_SCREEN` (its sign is not: files with z up say `-Z` too), else z. A residual above the options' `sigma_m`, and
+/// of at most 10 cm, is the standard deviation of its sample.
 ///
 /// # Errors
 /// If the header, a parameter or the data is not as the format wants it, or ends early.
@@ -33,19 +37,28 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
         None => up_of_screen(&parameters, &mut warnings)?,
     };
     let mut at_origin = 0;
-    let positions = frames::read(bytes, &header, processor)?
-        .map(|sample| {
-            let zero = sample.is_some_and(|p| p == nalgebra::Vector3::zeros());
-            at_origin += usize::from(zero);
-            let known = sample.filter(|_| !zero);
-            known.map_or(nalgebra::Vector3::repeat(f64::NAN), |p| points::y_up(up, p * metres))
-        })
-        .collect();
+    let mut positions = Vec::new();
+    let mut sigmas = Vec::new();
+    for sample in frames::read(bytes, &header, processor)? {
+        let zero = sample.as_ref().is_some_and(|s| s.position == nalgebra::Vector3::zeros());
+        at_origin += usize::from(zero);
+        let known = sample.filter(|_| !zero);
+        let sigma = known.as_ref().map(|s| s.residual * metres).filter(|s| *s > options.sigma_m);
+        let sigma = sigma.filter(|s| *s <= MAX_RESIDUAL);
+        if sigma.is_some() && sigmas.is_empty() {
+            sigmas.resize(positions.len(), f64::NAN);
+        }
+        if sigma.is_some() || !sigmas.is_empty() {
+            sigmas.push(sigma.unwrap_or(f64::NAN));
+        }
+        let position = known.map(|s| points::y_up(up, s.position * metres));
+        positions.push(position.unwrap_or(nalgebra::Vector3::repeat(f64::NAN)));
+    }
     if at_origin > 0 {
         warnings.add(Place::File, format!("{at_origin} samples at exactly 0 0 0 count as missing"));
     }
     let names = names(&parameters, header.points, &mut warnings);
-    let trajectories = PointTrajectories::new(names, header.rate, positions)?;
+    let trajectories = PointTrajectories::new(names, header.rate, positions)?.with_sigmas(sigmas)?;
     Ok(warnings.beside(trajectories))
 }
 
