@@ -44,6 +44,7 @@ fn seeds(test: &str) -> Option<Vec<Seed>> {
     let written = bvh::write(&three).into_bytes();
     let rows = first_lines(&testdata::read(&markers, "opensim_walk_free_01.trc"), 10);
     let points = trc::read(&rows, &PointsOptions::default()).unwrap().value;
+    let trust = "frame,time,a_x,a_y,a_z,a_sigma,a_confidence\n0,0,1,2,3,0.01,0.5\n1,0.1,1,2,3,,1e-3\n";
     // cut behind two frames of 44 points and 96 analog values, and the header says so
     let mut binary = testdata::read(&markers, "opensim_walking2.c3d");
     binary.truncate(13 * 512 + 2 * 4 * (4 * 44 + 96));
@@ -70,6 +71,11 @@ fn seeds(test: &str) -> Option<Vec<Seed>> {
         Seed {
             name: "csv",
             bytes: points_csv::write(&points).into_bytes(),
+            read: Box::new(|b| Ok(size_of_points(&points_csv::read(b)?.value))),
+        },
+        Seed {
+            name: "csv",
+            bytes: trust.into(),
             read: Box::new(|b| Ok(size_of_points(&points_csv::read(b)?.value))),
         },
         Seed {
