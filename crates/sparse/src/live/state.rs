@@ -66,10 +66,10 @@ impl Live<'_> {
             contest: ContestRecord {
                 is_over: self.contest.is_over(),
                 left: if let Phase::Heat { left } = self.contest.phase { left } else { 0 },
-                tried: self.contest.tried,
+                tried: if self.contest.is_over() { 0 } else { self.contest.tried },
             },
             matches: tracks.iter().map(|t| t.matches.clone()).collect(),
-            leader_surprise: self.contest.leader_surprise,
+            leader_surprise: if challengers.is_empty() { 0.0 } else { self.contest.leader_surprise },
             surprises: challengers.iter().map(|c| c.surprise).collect(),
         };
         let mut writer = Writer::new(MAGIC, &header);
