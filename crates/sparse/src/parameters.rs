@@ -96,6 +96,10 @@ pub struct Parameters {
     pub warm_up_frames: usize,
     /// frames over which neighbouring chunks are blended
     pub blend_frames: usize,
+    /// whether a session without a skeleton gets one that is fitted to its points, or else the database's own
+    pub fit_skeleton: bool,
+    /// whether standing feet are kept from sliding
+    pub foot_contacts: bool,
 }
 
 impl Default for Parameters {
@@ -122,6 +126,8 @@ impl Default for Parameters {
             chunk_frames: 600,
             warm_up_frames: 120,
             blend_frames: 30,
+            fit_skeleton: true,
+            foot_contacts: true,
         }
     }
 }
