@@ -4,8 +4,12 @@ use prost::Message;
 use std::{error::Error, path::PathBuf};
 
 const ROOT: &str = "../../proto";
-const FILES: [&str; 3] =
-    ["marey/v1/geometry.proto", "marey/v1/motion_index.proto", "marey/v1/reconstruction.proto"];
+const FILES: [&str; 4] = [
+    "marey/v1/geometry.proto",
+    "marey/v1/live.proto",
+    "marey/v1/motion_index.proto",
+    "marey/v1/reconstruction.proto",
+];
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rerun-if-changed={ROOT}");
