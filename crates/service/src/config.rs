@@ -13,6 +13,8 @@
 //! | `MAREY_MAX_OBJECT_BYTES` | 1 GiB | largest object read into memory |
 //! | `MAREY_MAX_INPUT_BYTES` | 8 GiB | unpacked motion files of one motion database |
 //! | `MAREY_MAX_SESSION_FRAMES` | 432000 | frames of one session at 60 a second: two hours |
+//! | `MAREY_LIVE_STREAMS` | 8 a core | live streams at once |
+//! | `MAREY_LIVE_IDLE_SECS` | 60 | a live stream without frames, or whose poses nobody reads, ends after so long |
 //! | `MAREY_LOG` | `info` | filter: `info`, `warn,motion_index=debug`, … |
 //! | `MAREY_LOG_FORMAT` | `pretty` | `pretty` or `json` |
 
@@ -33,6 +35,8 @@ pub struct Config {
     pub worker: WorkerConfig,
     /// Bounds on memory.
     pub memory: MemoryConfig,
+    /// Live streams.
+    pub live: LiveConfig,
 }
 
 /// How to reach PostgreSQL.
@@ -99,6 +103,23 @@ pub struct MemoryConfig {
     pub max_session_frames: usize,
 }
 
+/// Live streams of one process.
+#[derive(Debug, Clone)]
+pub struct LiveConfig {
+    /// Most streams at once; one has a thread. Default 8 a core: at 60 frames a second and half a millisecond a frame, a
+    /// quarter of it.
+    pub max_streams: usize,
+    /// How long a stream may be without a frame, or its poses without a reader. Default 60 s.
+    pub idle_timeout: Duration,
+}
+
+impl Default for LiveConfig {
+    fn default() -> Self {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Self { max_streams: 8 * cores, idle_timeout: Duration::from_secs(60) }
+    }
+}
+
 const GIB: u64 = 1 << 30;
 
 impl Config {
@@ -124,6 +145,7 @@ impl Config {
                 max_input_bytes: 8 * GIB,
                 max_session_frames: 2 * 60 * 60 * 60,
             },
+            live: LiveConfig::default(),
         }
     }
 
@@ -148,6 +170,10 @@ impl Config {
         vars.set("MAREY_MAX_OBJECT_BYTES", &mut config.memory.max_object_bytes)?;
         vars.set("MAREY_MAX_INPUT_BYTES", &mut config.memory.max_input_bytes)?;
         vars.set("MAREY_MAX_SESSION_FRAMES", &mut config.memory.max_session_frames)?;
+        vars.set("MAREY_LIVE_STREAMS", &mut config.live.max_streams)?;
+        let mut idle_secs = config.live.idle_timeout.as_secs();
+        vars.set("MAREY_LIVE_IDLE_SECS", &mut idle_secs)?;
+        config.live.idle_timeout = Duration::from_secs(idle_secs);
         Ok(config)
     }
 }

@@ -8,7 +8,7 @@ use tokio::{
     net::TcpListener,
     task::{JoinError, JoinHandle},
 };
-use tokio_stream::wrappers::TcpListenerStream;
+use tokio_stream::{StreamExt, wrappers::TcpListenerStream};
 use tokio_util::sync::CancellationToken;
 use tonic::{service::Routes, transport::Server};
 
@@ -116,11 +116,17 @@ async fn serve(
     grace: Duration,
     stop: CancellationToken,
 ) -> Result<(), Error> {
+    // Small answers must not wait for the acknowledgement of the last one.
+    let incoming = TcpListenerStream::new(listener).map(|accepted| {
+        let connection = accepted?;
+        connection.set_nodelay(true)?;
+        Ok::<_, std::io::Error>(connection)
+    });
     let server = Server::builder()
         .http2_keepalive_interval(Some(Duration::from_secs(30)))
         .trace_fn(|request| tracing::debug_span!("rpc", method = request.uri().path()))
         .add_routes(routes)
-        .serve_with_incoming_shutdown(TcpListenerStream::new(listener), stop.clone().cancelled_owned());
+        .serve_with_incoming_shutdown(incoming, stop.clone().cancelled_owned());
     let too_long = async {
         stop.cancelled().await;
         tokio::time::sleep(grace).await;
