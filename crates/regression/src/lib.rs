@@ -4,6 +4,8 @@
 //! query, and gives a Gaussian over the next pose: a mean and the factor of a covariance.
 //!
 //! - [`LocalRegression`]: weighted ridge regression in its dual form, leave-one-out residuals (LR eq. 4–10, mended).
+//! - [`LocalPca`]: principal components of the successors, and smoothness (Chai & Hodgins).
+//! - [`PrincipalRegression`]: least squares on the principal components of the inputs (Liu et al.).
 //! - [`gplvm`]: a global latent variable model, trained offline.
 //! - [`NearestExample`]: the successor of the nearest window; the plain baseline.
 //!
@@ -20,11 +22,16 @@
 mod error;
 pub mod gplvm;
 mod local;
+mod lpca;
+mod lpcr;
 mod nearest;
 mod prediction;
+mod principal;
 
 pub use error::Error;
 pub use local::LocalRegression;
+pub use lpca::{LocalPca, LpcaParameters};
+pub use lpcr::{LpcrParameters, PrincipalRegression};
 pub use nearest::NearestExample;
 pub use prediction::{Examples, Parameters, Prediction, Predictor, Query, kernel_weights};
 

@@ -97,6 +97,21 @@ pub enum Error {
         /// what would do
         expected: String,
     },
+    /// Method gplvm without a model.
+    #[error(
+        "method is gplvm and the motion database has no trained latent variable model, expected one to be trained first"
+    )]
+    NoModel,
+    /// A latent variable model of another database.
+    #[error(
+        "the latent variable model is of poses of {found} numbers, the motion database has poses of {expected}"
+    )]
+    OtherModel {
+        /// numbers of a pose of the model
+        found: usize,
+        /// numbers of a pose of the database
+        expected: usize,
+    },
     /// Chunks that do not make up the session.
     #[error("chunks end at frame {found}, expected frame {expected}")]
     Chunks {
@@ -105,6 +120,9 @@ pub enum Error {
         /// frame expected
         expected: usize,
     },
+    /// The model refuses.
+    #[error(transparent)]
+    Regression(#[from] regression::Error),
     /// The database refuses.
     #[error(transparent)]
     Database(#[from] motion_db::Error),

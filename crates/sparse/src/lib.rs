@@ -8,6 +8,7 @@
 //! - [`Parameters`]: everything a run can choose, each with a default.
 //! - [`Reconstructor`]: the frame loop over a range of frames, with start and re-entry.
 //! - [`Live`]: the same for frames that come one by one, now.
+//! - [`train_gplvm`]: the model that method `gplvm` needs.
 //! - [`plan_chunks`], [`merge`]: long sessions cut for many workers and put together again.
 
 mod bytes;
@@ -15,10 +16,12 @@ mod chunks;
 mod error;
 mod examples;
 mod live;
+mod methods;
 mod parameters;
 mod reconstruct;
 mod session;
 mod tracker;
+mod training;
 
 pub use chunks::{Chunk, Merged, merge, plan_chunks};
 pub use error::Error;
@@ -27,6 +30,7 @@ pub use live::{Live, LivePose, MAX_LIVE_STATE_BYTES};
 pub use parameters::{Covariance, Method, Parameters};
 pub use reconstruct::{FrameQuality, Reconstruction, Reconstructor, control_table};
 pub use session::Session;
+pub use training::train_gplvm;
 
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -9,7 +9,7 @@ use model::Samples;
 use nalgebra::Vector3;
 
 use crate::tracker::{Step, Track, Tracker};
-use crate::{FrameQuality, Reconstructor};
+use crate::{FrameQuality, Reconstructor, Result};
 use contest::Contest;
 use recent::Recent;
 pub use state::MAX_LIVE_STATE_BYTES;
@@ -59,12 +59,15 @@ pub struct Live<'a> {
 
 impl<'a> Live<'a> {
     /// Follows a performer with the skeleton and points of `reconstructor`'s session, whose frames are not looked at.
-    pub fn new(reconstructor: &'a Reconstructor<'a>) -> Self {
+    ///
+    /// # Errors
+    /// If the method's model is missing.
+    pub fn new(reconstructor: &'a Reconstructor<'a>) -> Result<Self> {
         let Reconstructor { database, session, parameters, kinematics, .. } = reconstructor;
         let (dofs, points) = (database.num_dofs(), session.points.len());
-        Self {
+        Ok(Self {
             reconstructor,
-            tracker: Tracker::new(reconstructor),
+            tracker: Tracker::new(reconstructor)?,
             leader: Track::blank(dofs, parameters),
             has_leader: false,
             contest: Contest::new(points, dofs, parameters),
@@ -77,7 +80,7 @@ impl<'a> Live<'a> {
             has_pose: false,
             joints: kinematics.state(),
             deviations: vec![0.0; dofs],
-        }
+        })
     }
 
     /// Takes one frame, 1/60 s after the one before, and gives its pose; `None` until a start was found, for which two points

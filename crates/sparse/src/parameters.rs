@@ -1,4 +1,6 @@
 use posterior::SolverParameters;
+use regression::gplvm::GplvmParameters;
+use regression::{LpcaParameters, LpcrParameters};
 use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
@@ -12,30 +14,45 @@ pub enum Method {
     LocalRegression,
     /// successor of the nearest example: the plain baseline
     Nearest,
+    /// principal components of the neighbours' successors, and smoothness (Chai & Hodgins)
+    Lpca,
+    /// least squares on the principal components of the neighbours' windows (Liu et al.)
+    Lpcr,
+    /// a global latent variable model trained beforehand (Grochow et al.); see [`crate::train_gplvm`]
+    Gplvm,
+}
+
+impl Method {
+    /// All methods.
+    pub const ALL: [Self; 5] = [Self::LocalRegression, Self::Nearest, Self::Lpca, Self::Lpcr, Self::Gplvm];
+
+    /// The name by which it is asked for.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LocalRegression => "local-regression",
+            Self::Nearest => "nearest",
+            Self::Lpca => "lpca",
+            Self::Lpcr => "lpcr",
+            Self::Gplvm => "gplvm",
+        }
+    }
 }
 
 impl std::str::FromStr for Method {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        match name {
-            "local-regression" => Ok(Self::LocalRegression),
-            "nearest" => Ok(Self::Nearest),
-            _ => Err(Error::Parameter {
-                name: "method",
-                found: name.to_owned(),
-                expected: "local-regression or nearest",
-            }),
-        }
+        Self::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| Error::Parameter {
+            name: "method",
+            found: name.to_owned(),
+            expected: "local-regression, nearest, lpca, lpcr or gplvm",
+        })
     }
 }
 
 impl std::fmt::Display for Method {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::LocalRegression => "local-regression",
-            Self::Nearest => "nearest",
-        })
+        f.write_str(self.name())
     }
 }
 
@@ -80,6 +97,14 @@ pub struct Parameters {
     pub bandwidth: f64,
     /// least standard deviation of a coordinate under the prior, degrees (angles) and centimetres (translations)
     pub min_sigma_deg: f64,
+    /// method lpca: share of the variance of the neighbours' successors that its components keep
+    pub lpca_variance: f64,
+    /// method lpca: standard deviation of the pose about where the last two poses lead, degrees and centimetres
+    pub lpca_smooth_deg: f64,
+    /// method lpcr: most principal components
+    pub lpcr_components: usize,
+    /// method gplvm: standard deviation of the pose about where the last two poses lead, degrees and centimetres
+    pub gplvm_smooth_deg: f64,
     /// most steps of the solver a frame
     pub max_steps: usize,
     /// start poses that are tried
@@ -118,6 +143,10 @@ impl Default for Parameters {
             ridge_distance: 1.0,
             bandwidth: 1.0,
             min_sigma_deg: 1.0,
+            lpca_variance: 0.99,
+            lpca_smooth_deg: 2.0,
+            lpcr_components: 1024,
+            gplvm_smooth_deg: 3.0,
             max_steps: 12,
             start_candidates: 8,
             start_frames: 24,
@@ -152,6 +181,7 @@ impl Parameters {
         };
         count("window", self.window, 1, 16, "1 to 16 frames")?;
         count("neighbours", self.neighbours, 2, 1024, "2 to 1024")?;
+        count("lpcr_components", self.lpcr_components, 0, 1024, "0 to 1024")?;
         count("max_steps", self.max_steps, 1, 100, "1 to 100")?;
         count("start_candidates", self.start_candidates, 1, 64, "1 to 64")?;
         count("start_frames", self.start_frames, 1, 240, "1 to 240 frames")?;
@@ -167,6 +197,9 @@ impl Parameters {
         number("ridge_distance", self.ridge_distance, 0.0, 1e3, "0 to 1000")?;
         number("bandwidth", self.bandwidth, 1e-3, 1e3, "0.001 to 1000")?;
         number("min_sigma_deg", self.min_sigma_deg, 1e-3, 90.0, "0.001 to 90 degrees")?;
+        number("lpca_variance", self.lpca_variance, 0.0, 1.0, "0 to 1")?;
+        number("lpca_smooth_deg", self.lpca_smooth_deg, 1e-3, 1e6, "0.001 to 1000000 degrees")?;
+        number("gplvm_smooth_deg", self.gplvm_smooth_deg, 1e-3, 1e6, "0.001 to 1000000 degrees")?;
         number("lost_energy", self.lost_energy, 1.0, 1e12, "1 to 1e12")
     }
 
@@ -177,6 +210,18 @@ impl Parameters {
             bandwidth: self.bandwidth,
             min_sigma: self.min_sigma_deg,
         }
+    }
+
+    pub(crate) fn lpca(&self) -> LpcaParameters {
+        LpcaParameters { variance: self.lpca_variance, smooth_sigma: self.lpca_smooth_deg }
+    }
+
+    pub(crate) fn lpcr(&self) -> LpcrParameters {
+        LpcrParameters { components: self.lpcr_components, ..LpcrParameters::default() }
+    }
+
+    pub(crate) fn gplvm(&self) -> GplvmParameters {
+        GplvmParameters { smooth_sigma: self.gplvm_smooth_deg }
     }
 
     pub(crate) fn solver(&self) -> SolverParameters {

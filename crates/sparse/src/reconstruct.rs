@@ -4,6 +4,7 @@ use std::sync::Arc;
 use kinematics::{Kinematics, PointSet};
 use motion_db::{ControlTable, MotionDatabase, WindowIndex, start_poses};
 use nalgebra::Vector3;
+use regression::gplvm::Gplvm;
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{Reader, Writer};
@@ -106,6 +107,7 @@ pub struct Reconstructor<'a> {
     pub(crate) kinematics: Kinematics,
     pub(crate) points: PointSet,
     pub(crate) table: Arc<ControlTable>,
+    pub(crate) model: Option<&'a Gplvm>,
     /// windows and poses that may not be used, in rising order
     pub(crate) exclude_rows: Vec<Range<usize>>,
     pub(crate) exclude_poses: Vec<Range<usize>>,
@@ -163,9 +165,23 @@ impl<'a> Reconstructor<'a> {
             kinematics,
             points,
             table,
+            model: None,
             exclude_rows: Vec::new(),
             exclude_poses: Vec::new(),
         })
+    }
+
+    /// With the latent variable model of the database ([`crate::train_gplvm`]), which method `gplvm` needs.
+    ///
+    /// # Errors
+    /// [`Error::OtherModel`] if its poses are not the database's.
+    pub fn with_model(mut self, model: &'a Gplvm) -> Result<Self> {
+        let (found, expected) = (model.dofs(), self.database.num_dofs());
+        if found != expected {
+            return Err(Error::OtherModel { found, expected });
+        }
+        self.model = Some(model);
+        Ok(self)
     }
 
     /// Leaves clips out of every search: `is_excluded` sees each clip of the database.
@@ -182,7 +198,8 @@ impl<'a> Reconstructor<'a> {
     /// done, and may stop it. The same arguments always give the same bits.
     ///
     /// # Errors
-    /// If the range is not in the session, no start pose is found, or `progress` stops it.
+    /// If the range is not in the session, no start pose is found, the method's model is missing, or `progress` stops
+    /// it.
     pub fn reconstruct(
         &self,
         frames: Range<usize>,
@@ -192,7 +209,7 @@ impl<'a> Reconstructor<'a> {
         if frames.start >= frames.end || frames.end > total {
             return Err(Error::Range { start: frames.start, end: frames.end, frames: total });
         }
-        let mut tracker = Tracker::new(self);
+        let mut tracker = Tracker::new(self)?;
         let dofs = self.database.num_dofs();
         let mut reconstruction = Reconstruction {
             first_frame: frames.start,

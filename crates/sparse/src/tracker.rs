@@ -8,10 +8,12 @@ use motion_db::{
 };
 use nalgebra::Vector3;
 use posterior::{ControlPoints, GaussianPrior, MapSolver, Measurement, Solution};
-use regression::{LocalRegression, NearestExample, Prediction, Predictor};
+use regression::gplvm::TrainingOptions;
+use regression::{Prediction, Predictor};
 
 use crate::examples::ExampleBuffer;
-use crate::{Covariance, Method, Parameters, Reconstructor};
+use crate::methods::predictor;
+use crate::{Covariance, Parameters, Reconstructor, Result};
 
 /// Standard deviations of samples are taken into this range, metres: beyond it the solver's arithmetic ends.
 const MIN_SIGMA_M: f64 = 1e-5;
@@ -82,7 +84,7 @@ pub struct Tracker<'a> {
     scale: f64,
     root_offset: Vector3<f64>,
     exclude: &'a [Range<usize>],
-    predictor: Box<dyn Predictor>,
+    predictor: Box<dyn Predictor + 'a>,
     prediction: Prediction,
     examples: ExampleBuffer,
     prior: GaussianPrior,
@@ -101,28 +103,28 @@ pub struct Tracker<'a> {
     control_factors: Vec<f64>,
     measured: Vec<Option<Measurement>>,
     local: Vec<f64>,
+    found: Vec<f64>,
 }
 
 impl<'a> Tracker<'a> {
     /// A tracker of the session, database and exclusions of `reconstructor`.
-    pub fn new(reconstructor: &'a Reconstructor<'_>) -> Self {
+    ///
+    /// # Errors
+    /// If the method's model is missing.
+    pub fn new(reconstructor: &'a Reconstructor<'_>) -> Result<Self> {
         let Reconstructor { database, index, session, parameters, kinematics, points, table, .. } =
             reconstructor;
         let dofs = database.num_dofs();
         let k = parameters.neighbours;
         let num_controls = 3 * points.len();
         let width = index.width() + if parameters.control_points_in_query { num_controls } else { 0 };
-        let predictor: Box<dyn Predictor> = match parameters.method {
-            Method::LocalRegression => Box::new(LocalRegression::new(k, width, dofs)),
-            Method::Nearest => Box::new(NearestExample),
-        };
         let mut control_weights = vec![0.0; num_controls + 1];
         control_weights[num_controls] = parameters.skeleton_weight.powi(2) as f32;
-        Self {
+        Ok(Self {
             scale: database.leg_length() / SkeletonSize::leg_length(&session.skeleton),
             root_offset: session.skeleton.joints()[0].offset,
-            predictor,
-            prediction: Prediction::new(k, dofs),
+            predictor: predictor(reconstructor, width)?,
+            prediction: Prediction::new(k.max(TrainingOptions::MOST_LATENT_DIMS), dofs),
             examples: ExampleBuffer::new(k, width, dofs),
             prior: GaussianPrior::new(dofs),
             sigma: vec![0.0; dofs],
@@ -139,13 +141,14 @@ impl<'a> Tracker<'a> {
             control_factors: vec![0.0; num_controls],
             measured: vec![None; points.len()],
             local: vec![0.0; dofs],
+            found: vec![0.0; dofs],
             database,
             index,
             table,
             parameters,
             kinematics,
             exclude: &reconstructor.exclude_rows,
-        }
+        })
     }
 
     /// A track that stands where a start pose of the database was put.
@@ -177,13 +180,10 @@ impl<'a> Tracker<'a> {
         self.measure(&frame, measured);
         self.find_neighbours(track);
         self.predict();
-        let solution = self.solver.solve(
-            self.kinematics,
-            &mut self.likelihood,
-            &self.measured,
-            &self.prior,
-            &self.parameters.solver(),
-        );
+        let mut solution = self.solve();
+        while self.relinearise(&solution) {
+            solution = self.solve();
+        }
         // The oldest pose makes room for the new one.
         track.history.rotate_right(1);
         let newest = &mut track.history[0];
@@ -195,6 +195,26 @@ impl<'a> Tracker<'a> {
         let measured = 3 * self.measured.iter().flatten().count();
         let nearest = self.neighbours.first().map_or(f64::INFINITY, |n| n.distance_squared);
         Step { solution, measured, neighbour_distance: (nearest / self.query.len() as f64).sqrt() }
+    }
+
+    /// The most probable pose between prediction and measurement.
+    fn solve(&mut self) -> Solution {
+        self.set_prior();
+        self.solver.solve(
+            self.kinematics,
+            &mut self.likelihood,
+            &self.measured,
+            &self.prior,
+            &self.parameters.solver(),
+        )
+    }
+
+    /// Whether the prediction, seen from the pose found, has changed.
+    fn relinearise(&mut self, solution: &Solution) -> bool {
+        for ((out, x), factor) in self.found.iter_mut().zip(self.solver.coordinates()).zip(&self.local) {
+            *out = x / factor;
+        }
+        self.predictor.relinearise(&self.found, solution.likelihood_energy, &mut self.prediction)
     }
 
     /// Mean posterior standard deviation over the joint angles of the last step, radians; `all` receives every
@@ -266,7 +286,11 @@ impl<'a> Tracker<'a> {
         let examples = self.examples.gather(self.database, self.index, &self.neighbours, controls);
         let query = regression::Query { inputs: &self.query, recent: &self.features };
         self.predictor.predict(&examples, &query, &self.parameters.regression(), &mut self.prediction);
-        // From degrees and centimetres at the database's scale to radians and metres at the performer's.
+    }
+
+    /// The prediction as a prior: from degrees and centimetres at the database's scale to radians and metres at the
+    /// performer's.
+    fn set_prior(&mut self) {
         let dofs = self.prior.mean.len();
         for (d, per_unit) in self.index.scale().per_dof.iter().enumerate() {
             let factor = if d < 3 { 1.0 / (per_unit * self.scale) } else { 1.0 / per_unit };

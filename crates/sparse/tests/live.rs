@@ -34,7 +34,7 @@ fn once_it_has_settled_it_finds_what_is_found_offline() {
         let session = session(&drawn(action, seed % 2, seed, 200).motion, &SIX);
         let offline = recorded.reconstruct(&session, &parameters);
         let reconstructor = recorded.reconstructor(&session, &parameters);
-        let mut live = Live::new(&reconstructor);
+        let mut live = Live::new(&reconstructor).unwrap();
         for frame in 0..session.num_frames() {
             let found = push(&mut live, &session, frame).expect("the first frame has all points");
             let difference = difference_deg(&found, &offline.coordinates[frame * dofs..][..dofs]);
@@ -49,17 +49,17 @@ fn a_stream_that_is_resumed_gives_the_same_bits() {
     let session = walk(120);
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
-    let mut whole = Live::new(&reconstructor);
+    let mut whole = Live::new(&reconstructor).unwrap();
     let poses: Vec<_> = (0..120).map(|frame| push(&mut whole, &session, frame)).collect();
     // In the first heat, in a later one, and when all is decided.
     for cut in [5, 40, 100] {
-        let mut first = Live::new(&reconstructor);
+        let mut first = Live::new(&reconstructor).unwrap();
         for frame in 0..cut {
             push(&mut first, &session, frame);
         }
         let state = first.state();
         assert!(state.len() < 16 << 10, "{} bytes", state.len());
-        let mut second = Live::new(&reconstructor);
+        let mut second = Live::new(&reconstructor).unwrap();
         second.resume(&state).unwrap();
         assert!(second.state() == state);
         for (frame, expected) in poses.iter().enumerate().skip(cut) {
@@ -74,11 +74,11 @@ fn channels_do_not_jump_where_a_stream_was_resumed() {
     let session = walk(101);
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
-    let mut live = Live::new(&reconstructor);
+    let mut live = Live::new(&reconstructor).unwrap();
     for frame in 0..100 {
         push(&mut live, &session, frame);
     }
-    let mut other = Live::new(&reconstructor);
+    let mut other = Live::new(&reconstructor).unwrap();
     other.resume(&live.state()).unwrap();
     let last = session.trajectories.samples(100);
     assert_eq!(other.push(last).map(|p| p.pose.to_vec()), live.push(last).map(|p| p.pose.to_vec()));
@@ -90,7 +90,7 @@ fn a_state_that_is_damaged_or_of_something_else_is_refused() {
     let session = walk(40);
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
-    let mut live = Live::new(&reconstructor);
+    let mut live = Live::new(&reconstructor).unwrap();
     for frame in 0..40 {
         push(&mut live, &session, frame);
     }
@@ -106,7 +106,7 @@ fn a_state_that_is_damaged_or_of_something_else_is_refused() {
     // Well made, but of other points.
     let fewer = fixtures::session(&drawn(Action::Walk, 0, 300, 40).motion, &SIX[..4]);
     let others = recorded.reconstructor(&fewer, &parameters);
-    let message = Live::new(&others).resume(&state).unwrap_err().to_string();
+    let message = Live::new(&others).unwrap().resume(&state).unwrap_err().to_string();
     assert!(message.contains("another motion database, skeleton, choice of points"), "{message}");
     // Whatever was refused, the stream goes on.
     assert!(push(&mut live, &session, 39).is_some());
@@ -127,7 +127,7 @@ fn a_forged_state_is_refused_or_harmless() {
     let session = walk(60);
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
-    let mut live = Live::new(&reconstructor);
+    let mut live = Live::new(&reconstructor).unwrap();
     for frame in 0..30 {
         push(&mut live, &session, frame);
     }
@@ -178,7 +178,7 @@ fn frames_take_no_memory_and_starts_take_none_either() {
     let session = walk(200);
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
-    let mut live = Live::new(&reconstructor);
+    let mut live = Live::new(&reconstructor).unwrap();
     let nowhere = vec![Vector3::repeat(f64::NAN); 6];
     for frame in 0..3 {
         live.push(session.trajectories.samples(frame));
@@ -203,7 +203,7 @@ fn a_gap_of_all_points_is_survived_and_the_body_found_again() {
     let session = changed(&whole, |f, _, p| if gap.contains(&f) { Vector3::repeat(f64::NAN) } else { p });
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
-    let mut live = Live::new(&reconstructor);
+    let mut live = Live::new(&reconstructor).unwrap();
     for frame in 0..260 {
         let found = live.push(session.trajectories.samples(frame)).expect("a pose, gap or not");
         assert_eq!(found.quality.measured_points, if gap.contains(&frame) { 0 } else { 6 });
@@ -221,7 +221,7 @@ fn a_performer_who_is_suddenly_elsewhere_is_found_again() {
         changed(&whole, |f, _, p| if f < 120 { p } else { Vector3::new(3.0 - p.z, p.y, p.x - 7.0) });
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
-    let mut live = Live::new(&reconstructor);
+    let mut live = Live::new(&reconstructor).unwrap();
     let mut was_lost = false;
     for frame in 0..260 {
         let found = live.push(session.trajectories.samples(frame)).unwrap();
@@ -241,7 +241,7 @@ fn it_waits_for_two_points_and_then_starts() {
     let session = changed(&whole, |f, i, p| if alone(f, i) { Vector3::repeat(f64::NAN) } else { p });
     let parameters = Parameters::default();
     let reconstructor: Reconstructor<'_> = recorded.reconstructor(&session, &parameters);
-    let mut live = Live::new(&reconstructor);
+    let mut live = Live::new(&reconstructor).unwrap();
     for frame in 0..60 {
         assert_eq!(push(&mut live, &session, frame).is_some(), frame >= 20, "frame {frame}");
     }
@@ -254,7 +254,7 @@ fn absurd_numbers_never_panic() {
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
     let absurd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -9e4, 9.9e4, 1e-310, f64::MAX];
-    let mut live = Live::new(&reconstructor);
+    let mut live = Live::new(&reconstructor).unwrap();
     for frame in 0..400 {
         let mut positions = session.trajectories.frame(frame % 60).to_vec();
         let at = frame % 18;

@@ -1,8 +1,8 @@
 //! The file of a trained model: 8 letters, u32 version, u32 dofs, latent dimensions and active poses, then f64: γ, β⁻¹,
 //! μ, w⁻², latent points, features; last a BLAKE3 checksum of all before. Little-endian.
 
-use crate::gplvm::Gplvm;
 use crate::gplvm::model::Stored;
+use crate::gplvm::{Gplvm, TrainingOptions};
 use crate::{Error, Result};
 
 const MAGIC: &[u8; 8] = b"MAREYGPL";
@@ -10,7 +10,7 @@ const VERSION: u32 = 1;
 const HEADER: usize = 8 + 4 * 4;
 const CHECKSUM: usize = 32;
 const MOST_DOFS: usize = 4096;
-const MOST_LATENT_DIMS: usize = 8;
+const MOST_LATENT_DIMS: usize = TrainingOptions::MOST_LATENT_DIMS;
 const MOST_ACTIVE: usize = 1000;
 
 impl Gplvm {

@@ -70,13 +70,16 @@ impl Default for TrainingOptions {
 }
 
 impl TrainingOptions {
+    /// Most latent dimensions.
+    pub const MOST_LATENT_DIMS: usize = 8;
+
     /// Checks every value against its range.
     ///
     /// # Errors
     /// [`Error::Option`] names the first one out of range.
     pub fn check(&self) -> Result<()> {
         let ranges = [
-            ("latent_dims", self.latent_dims, 1..=8, "1 to 8"),
+            ("latent_dims", self.latent_dims, 1..=Self::MOST_LATENT_DIMS, "1 to 8"),
             ("active", self.active, 16..=1000, "16 to 1000"),
             ("max_iterations", self.max_iterations, 1..=2000, "1 to 2000"),
         ];
