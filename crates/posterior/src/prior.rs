@@ -16,22 +16,9 @@ impl GaussianPrior {
     /// Σ = EᵀE + diag(σ²). `residuals` E is row-major, shape `[K, dofs]`; `min_sigma` has shape `[dofs]`.
     pub fn set_full(&mut self, residuals: &[f64], min_sigma: &[f64]) {
         let dofs = self.mean.len();
-        self.covariance.fill(0.0);
-        for row in residuals.chunks_exact(dofs) {
-            // Upper triangle.
-            for i in 0..dofs {
-                let factor = row[i];
-                let sums = &mut self.covariance[i * dofs + i..(i + 1) * dofs];
-                for (sum, v) in sums.iter_mut().zip(&row[i..]) {
-                    *sum += factor * v;
-                }
-            }
-        }
+        dense::self_product(residuals, dofs, &mut self.covariance);
         for (i, sigma) in min_sigma.iter().enumerate() {
             self.covariance[i * dofs + i] += sigma * sigma;
-            for j in 0..i {
-                self.covariance[i * dofs + j] = self.covariance[j * dofs + i];
-            }
         }
     }
 

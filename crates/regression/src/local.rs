@@ -1,11 +1,10 @@
-use faer::linalg::matmul::matmul;
-use faer::linalg::matmul::triangular::{BlockStructure, matmul as matmul_triangular};
-use faer::linalg::triangular_inverse::invert_lower_triangular;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Accum, MatMut, MatRef, Par};
+use dense::{PAD, ROWS, padded};
 
 use crate::prediction::kernel_weights;
 use crate::{Examples, Parameters, Prediction, Predictor, Query};
+
+/// Least square of a pivot: one lost to rounding is held there.
+const LEAST_PIVOT: f64 = 1e-12;
 
 /// Local regression in its dual form (LR eq. 4–10 with the mends of method §2).
 ///
@@ -18,59 +17,92 @@ use crate::{Examples, Parameters, Prediction, Predictor, Query};
 /// G = X̃ X̃ᵀ + λ I,   ŷ = ȳ + (x_q − x̄)ᵀ X̃ᵀ G⁻¹ Ỹ,   e_k = (G⁻¹ Ỹ)_k / (G⁻¹)_kk
 /// ```
 ///
-/// where `e_k` is the leave-one-out residual of example k times √ω_k (mend 6).
+/// where `e_k` is the leave-one-out residual of example k times √ω_k (mend 6). X̃ itself is never made: G follows from the
+/// inner products of the x as they are. With `UᵀU = G`, one elimination of `[G | Ỹ | X̃ (x_q − x̄) | I]` leaves
+/// `[U | U⁻ᵀỸ | U⁻ᵀX̃ (x_q − x̄) | U⁻ᵀ]`, of which prediction and residuals are products.
 #[derive(Debug, Clone)]
 pub struct LocalRegression {
-    /// X̃, `[K, width]`
-    inputs: Vec<f64>,
-    /// Ỹ, then L⁻¹ Ỹ, `[K, dofs]`
-    targets: Vec<f64>,
-    /// L⁻¹ Ỹ, `[K, dofs]`
-    solved: Vec<f64>,
-    /// G, then its Cholesky factor L, `[K, K]`
-    gram: Vec<f64>,
-    /// L⁻¹, `[K, K]`
-    inverse: Vec<f64>,
-    mean_input: Vec<f64>,
-    /// X̃ (x_q − x̄), then L⁻¹ of it, `[K]`
+    /// `[G | Ỹ | X̃ (x_q − x̄) | I]`, row-major
+    system: Vec<f64>,
+    /// X x̄, then the diagonal of G⁻¹, `[K]`
+    products: Vec<f64>,
+    /// X x_q, then U⁻ᵀX̃ (x_q − x̄), `[K]`
     kernel: Vec<f64>,
+    /// √ω, `[K]`
+    roots: Vec<f64>,
+}
+
+/// Where the parts of the system are, for K examples of D targets.
+#[derive(Debug, Clone, Copy)]
+struct Layout {
+    rows: usize,
+    targets: usize,
+    kernel: usize,
+    identity: usize,
+    stride: usize,
+}
+
+impl Layout {
+    fn new(k: usize, dofs: usize) -> Self {
+        let targets = padded(k, PAD);
+        let identity = targets + padded(dofs + 1, PAD);
+        let stride = dense::stride(identity + padded(k, PAD));
+        Self { rows: padded(k, ROWS), targets, kernel: targets + dofs, identity, stride }
+    }
 }
 
 impl LocalRegression {
-    /// Memory for `neighbours` examples of `width` inputs and `dofs` targets.
-    pub fn new(neighbours: usize, width: usize, dofs: usize) -> Self {
+    /// Memory for `neighbours` examples of `dofs` targets; the number of inputs may be any.
+    pub fn new(neighbours: usize, _width: usize, dofs: usize) -> Self {
+        let layout = Layout::new(neighbours, dofs);
         Self {
-            inputs: vec![0.0; neighbours * width],
-            targets: vec![0.0; neighbours * dofs],
-            solved: vec![0.0; neighbours * dofs],
-            gram: vec![0.0; neighbours * neighbours],
-            inverse: vec![0.0; neighbours * neighbours],
-            mean_input: vec![0.0; width],
+            system: vec![0.0; layout.rows * layout.stride],
+            products: vec![0.0; neighbours],
             kernel: vec![0.0; neighbours],
+            roots: vec![0.0; neighbours],
         }
     }
 
-    /// Centres with the weighted means and multiplies each example by the root of its weight.
-    fn centre(&mut self, examples: &Examples<'_>, query: &[f64], out: &mut Prediction) {
-        let (width, dofs) = (examples.width, examples.dofs);
-        self.mean_input.fill(0.0);
-        out.mean.fill(0.0);
-        for (k, &w) in out.weights[..examples.len()].iter().enumerate() {
-            add_scaled(&mut self.mean_input, w, &examples.inputs[k * width..][..width]);
-            add_scaled(&mut out.mean, w, examples.target(k));
-        }
-        for (k, &w) in out.weights[..examples.len()].iter().enumerate() {
-            let root = w.sqrt();
-            let input = &mut self.inputs[k * width..][..width];
-            let example = &examples.inputs[k * width..][..width];
-            let mut product = 0.0;
-            for i in 0..width {
-                input[i] = root * (example[i] - self.mean_input[i]);
-                product += input[i] * (query[i] - self.mean_input[i]);
+    /// Fills the system, and puts ȳ into `out.mean`. The weights in `out` are those of the examples.
+    fn fill(&mut self, at: Layout, examples: &Examples<'_>, query: &[f64], ridge: f64, out: &mut Prediction) {
+        let (k, width, dofs) = (examples.len(), examples.width, examples.dofs);
+        let weights = &out.weights[..k];
+        let system = &mut self.system[..at.rows * at.stride];
+        system.fill(0.0);
+        dense::gram(examples.inputs, k, width, system, at.stride);
+        dense::products(examples.inputs, query, &mut self.kernel[..k]);
+        // Inner products with the weighted mean, of the examples, of the query and of itself.
+        let products = &mut self.products[..k];
+        products.fill(0.0);
+        for (i, row) in system.chunks_exact(at.stride).take(k).enumerate() {
+            let mut sum = weights[i] * row[i];
+            for j in i + 1..k {
+                sum += weights[j] * row[j];
+                products[j] += weights[i] * row[j];
             }
-            self.kernel[k] = product;
-            let target = &mut self.targets[k * dofs..][..dofs];
-            for ((t, y), m) in target.iter_mut().zip(examples.target(k)).zip(&out.mean) {
+            products[i] += sum;
+        }
+        let of_mean: f64 = products.iter().zip(weights).map(|(p, w)| p * w).sum();
+        let of_query: f64 = self.kernel[..k].iter().zip(weights).map(|(p, w)| p * w).sum();
+        out.mean.fill(0.0);
+        dense::weighted_sum(examples.targets, dofs, weights, &mut out.mean);
+        for (root, w) in self.roots.iter_mut().zip(weights) {
+            *root = w.sqrt();
+        }
+        for (i, row) in system.chunks_exact_mut(at.stride).enumerate() {
+            row[at.identity + i] = 1.0;
+            if i >= k {
+                row[i] = 1.0;
+                continue;
+            }
+            let root = self.roots[i];
+            let here = of_mean - products[i];
+            for ((g, p), other) in row[i..k].iter_mut().zip(&products[i..]).zip(&self.roots[i..]) {
+                *g = root * other * (*g - p + here);
+            }
+            row[i] += ridge;
+            row[at.kernel] = root * (self.kernel[i] - of_query + here);
+            for ((t, y), m) in row[at.targets..].iter_mut().zip(examples.target(i)).zip(&out.mean) {
                 *t = root * (y - m);
             }
         }
@@ -89,90 +121,35 @@ impl Predictor for LocalRegression {
         if k == 0 {
             return;
         }
-        out.rows = examples.len();
+        out.rows = k;
         out.sigma.fill(parameters.min_sigma);
         kernel_weights(examples.distances_squared, parameters.bandwidth, &mut out.weights);
-        self.centre(examples, query.inputs, out);
         let nearest = examples.distances_squared.iter().copied().fold(f64::INFINITY, f64::min);
         let ridge = parameters.ridge + parameters.ridge_distance * nearest / width as f64;
+        let at = Layout::new(k, dofs);
+        self.fill(at, examples, query.inputs, ridge, out);
 
-        let inputs = MatRef::from_row_major_slice(&self.inputs[..k * width], k, width);
-        let mut gram = MatMut::from_row_major_slice_mut(&mut self.gram[..k * k], k, k);
-        matmul_triangular(
-            gram.as_mut(),
-            BlockStructure::TriangularLower,
-            Accum::Replace,
-            inputs,
-            BlockStructure::Rectangular,
-            inputs.transpose(),
-            BlockStructure::Rectangular,
-            1.0,
-            Par::Seq,
-        );
-        for i in 0..k {
-            gram[(i, i)] += ridge;
+        let system = &mut self.system[..at.rows * at.stride];
+        dense::eliminate(system, at.rows, at.stride, Some(at.identity), LEAST_PIVOT);
+        let kernel = &mut self.kernel[..k];
+        let diagonal = &mut self.products[..k];
+        diagonal.fill(0.0);
+        for (row, kernel) in system.chunks_exact(at.stride).zip(kernel.iter_mut()) {
+            *kernel = row[at.kernel];
+            // (G⁻¹)_ii is the squared length of column i of U⁻ᵀ.
+            for (sum, v) in diagonal.iter_mut().zip(&row[at.identity..]) {
+                *sum += v * v;
+            }
         }
-        cholesky(&mut self.gram[..k * k], k);
-        let lower = MatRef::from_row_major_slice(&self.gram[..k * k], k, k);
-        let mut inverse = MatMut::from_row_major_slice_mut(&mut self.inverse[..k * k], k, k);
-        inverse.fill(0.0);
-        invert_lower_triangular(inverse.as_mut(), lower, Par::Seq);
-
-        // L⁻¹ Ỹ and L⁻¹ k: the prediction is their product; L⁻ᵀ L⁻¹ Ỹ gives the residuals.
-        let targets = MatRef::from_row_major_slice(&self.targets[..k * dofs], k, dofs);
-        let mut solved = MatMut::from_row_major_slice_mut(&mut self.solved[..k * dofs], k, dofs);
-        solved.copy_from(targets);
-        solve_lower_triangular_in_place(lower, solved.as_mut(), Par::Seq);
-        let kernel = MatMut::from_column_major_slice_mut(&mut self.kernel[..k], k, 1);
-        solve_lower_triangular_in_place(lower, kernel, Par::Seq);
-        for (row, weight) in self.solved.chunks_exact(dofs).zip(&self.kernel[..k]) {
-            add_scaled(&mut out.mean, *weight, row);
-        }
-        let inverse = MatRef::from_row_major_slice(&self.inverse[..k * k], k, k);
-        let mut residuals = MatMut::from_row_major_slice_mut(&mut out.residuals[..k * dofs], k, dofs);
-        let solved = MatRef::from_row_major_slice(&self.solved[..k * dofs], k, dofs);
-        matmul(residuals.as_mut(), Accum::Replace, inverse.transpose(), solved, 1.0, Par::Seq);
-        for i in 0..k {
-            // (G⁻¹)_ii is the squared length of column i of L⁻¹.
-            let diagonal: f64 = (i..k).map(|j| self.inverse[j * k + i].powi(2)).sum();
-            out.residuals[i * dofs..(i + 1) * dofs].iter_mut().for_each(|r| *r /= diagonal);
+        dense::weighted_sum(&system[at.targets..], at.stride, kernel, &mut out.mean);
+        let residuals = &mut out.residuals[..k * dofs];
+        let parts = [at.identity, at.targets];
+        dense::transposed_product(system, k, at.stride, parts, dofs, residuals);
+        for (row, diagonal) in residuals.chunks_exact_mut(dofs).zip(diagonal) {
+            let scale = 1.0 / *diagonal;
+            row.iter_mut().for_each(|r| *r *= scale);
         }
     }
-}
-
-fn add_scaled(sum: &mut [f64], factor: f64, row: &[f64]) {
-    for (s, v) in sum.iter_mut().zip(row) {
-        *s += factor * v;
-    }
-}
-
-/// Cholesky factor of a positive definite matrix in place, lower triangle, row-major. The ridge keeps every pivot
-/// positive; a pivot lost to rounding is held at a tiny positive number.
-fn cholesky(a: &mut [f64], n: usize) {
-    for j in 0..n {
-        let (above, below) = a.split_at_mut((j + 1) * n);
-        let row_j = &mut above[j * n..];
-        let square: f64 = row_j[..j].iter().map(|v| v * v).sum();
-        let pivot = (row_j[j] - square).max(1e-12).sqrt();
-        row_j[j] = pivot;
-        for row_i in below.chunks_exact_mut(n) {
-            row_i[j] = (row_i[j] - dot(&row_i[..j], &row_j[..j])) / pivot;
-        }
-    }
-}
-
-/// Inner product in four lanes; the order of the sum is fixed.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 4];
-    let (a4, a_rest) = a.as_chunks::<4>();
-    let (b4, b_rest) = b.as_chunks::<4>();
-    for (x, y) in a4.iter().zip(b4) {
-        for i in 0..4 {
-            lanes[i] += x[i] * y[i];
-        }
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
-    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
 }
 
 #[cfg(test)]
@@ -250,19 +227,23 @@ mod tests {
             &parameters,
             &mut prediction,
         );
+        let w = &prediction.weights;
+        let roots: Vec<f64> = w.iter().map(|w| w.sqrt()).collect();
+        let mean_y: f64 = (0..k).map(|r| w[r] * y[r]).sum();
+        let mean_x: Vec<f64> = (0..width).map(|i| (0..k).map(|r| w[r] * x[r * width + i]).sum()).collect();
         for (left_out, weight) in prediction.weights.iter().enumerate() {
             let keep: Vec<usize> = (0..k).filter(|&r| r != left_out).collect();
-            let centred = |r: usize, i: usize| regression.inputs[r * width + i];
+            let centred = |r: usize, i: usize| roots[r] * (x[r * width + i] - mean_x[i]);
+            let target = |r: usize| roots[r] * (y[r] - mean_y);
             let normal = Mat::<f64>::from_fn(width, width, |i, j| {
                 let sum: f64 = keep.iter().map(|&r| centred(r, i) * centred(r, j)).sum();
                 sum + if i == j { 0.1 } else { 0.0 }
             });
-            let right = Mat::<f64>::from_fn(width, 1, |i, _| {
-                keep.iter().map(|&r| centred(r, i) * regression.targets[r]).sum()
-            });
+            let right =
+                Mat::<f64>::from_fn(width, 1, |i, _| keep.iter().map(|&r| centred(r, i) * target(r)).sum());
             let a = normal.partial_piv_lu().solve(&right);
             let fitted: f64 = (0..width).map(|i| a[(i, 0)] * centred(left_out, i)).sum();
-            let expected = regression.targets[left_out] - fitted;
+            let expected = target(left_out) - fitted;
             assert!((prediction.residuals[left_out] - expected).abs() < 1e-9, "{left_out} {weight}");
         }
     }
