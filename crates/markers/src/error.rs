@@ -1,0 +1,66 @@
+/// Why markers can't be mapped to control points.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A map that is not TOML, or has other keys than a map has.
+    #[error("marker map: {message}")]
+    Syntax {
+        /// what is wrong, with its line
+        message: String,
+    },
+    /// A value of a map that makes no sense.
+    #[error("marker map: {what} is {found}, expected {expected}")]
+    Value {
+        /// which value
+        what: String,
+        /// what it is
+        found: String,
+        /// what it may be
+        expected: &'static str,
+    },
+    /// No preset has that name.
+    #[error("there is no marker set {name:?}, expected one of: {known}")]
+    NoSuchPreset {
+        /// the name asked for
+        name: String,
+        /// the names there are
+        known: String,
+    },
+    /// None of a control point's markers is in the file.
+    #[error("control point {point} is made of {markers}, none of which is in the file; it has {has}")]
+    NoMarkers {
+        /// the control point
+        point: String,
+        /// its markers
+        markers: String,
+        /// names in the file
+        has: String,
+    },
+    /// A name of a map stands for several of the file.
+    #[error(
+        "marker {name} of the map may be any of {found} in the file; say which with a prefix or with the whole name"
+    )]
+    Unclear {
+        /// the marker's name in the map
+        name: String,
+        /// what it may be in the file
+        found: String,
+    },
+    /// The file's names belong to no preset.
+    #[error(
+        "the file's markers belong to no known marker set ({nearest}); say what they are with a marker map"
+    )]
+    Unknown {
+        /// what came nearest
+        nearest: String,
+    },
+    /// The file's names belong to several presets, or to several people.
+    #[error("the file's markers may be any of {candidates}; say which")]
+    Ambiguous {
+        /// presets and prefixes
+        candidates: String,
+    },
+    /// The combined trajectories contradict each other; a fault of this crate.
+    #[error(transparent)]
+    Model(#[from] model::Error),
+}
