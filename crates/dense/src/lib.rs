@@ -8,7 +8,8 @@
 //! - [`gram`], [`products`]: inner products of rows.
 //! - [`eliminate`]: Cholesky factor and forward substitution in one pass.
 //! - [`transposed_product`], [`self_product`]: `AᵀB` and `AᵀA`.
-//! - [`add_scaled`]: sums of rows.
+//! - [`selected_product`]: a product with a matrix of few columns that are not zero.
+//! - [`add_scaled`], [`weighted_sum`], [`inner_product`]: sums of rows.
 //!
 //! Kernels of large matrix libraries may end with the upper halves of the vector registers in use, and all that is compiled
 //! for older processors then runs at a third of its speed until something clears them. These clear them.
@@ -31,8 +32,8 @@ mod products;
 mod rows;
 
 pub use eliminate::{eliminate, solve_upper};
-pub use products::{gram, products, self_product, transposed_product};
-pub use rows::{add_scaled, weighted_sum};
+pub use products::{gram, products, selected_product, self_product, transposed_product};
+pub use rows::{add_scaled, inner_product, weighted_sum};
 
 #[cfg(test)]
 mod tests_numbers {

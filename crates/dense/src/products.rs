@@ -209,6 +209,58 @@ impl WithSimd for SelfProduct<'_> {
     }
 }
 
+/// `A B` for three rows A of which only the columns `chosen` are not zero. `a` has shape `[3, n]`, `b` `[n, columns]`, `out`
+/// `[3, columns]`.
+pub fn selected_product(a: &[f64], chosen: &[usize], b: &[f64], columns: usize, out: &mut [f64]) {
+    let n = a.len() / 3;
+    assert!(a.len() == 3 * n && b.len() == n * columns && out.len() == 3 * columns);
+    Arch::new().dispatch(SelectedProduct { a, chosen, b, columns, out });
+}
+
+struct SelectedProduct<'a> {
+    a: &'a [f64],
+    chosen: &'a [usize],
+    b: &'a [f64],
+    columns: usize,
+    out: &'a mut [f64],
+}
+
+impl WithSimd for SelectedProduct<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { a, chosen, b, columns, out } = self;
+        let n = a.len() / 3;
+        let rows = [&a[..n], &a[n..2 * n], &a[2 * n..]];
+        let chunk = 2 * S::F64_LANES;
+        if columns < chunk {
+            for (row, out) in rows.iter().zip(out.chunks_exact_mut(columns)) {
+                for (j, out) in out.iter_mut().enumerate() {
+                    *out = chosen.iter().map(|&d| row[d] * b[d * columns + j]).sum();
+                }
+            }
+            return;
+        }
+        for j in (0..columns).step_by(chunk).map(|j| j.min(columns - chunk)) {
+            let mut sums = [[simd.splat_f64s(0.0); 2]; 3];
+            for &d in chosen {
+                let (values, _) = S::as_simd_f64s(&b[d * columns + j..][..chunk]);
+                for r in 0..3 {
+                    let factor = simd.splat_f64s(rows[r][d]);
+                    for c in 0..2 {
+                        sums[r][c] = simd.mul_add_e_f64s(factor, values[c], sums[r][c]);
+                    }
+                }
+            }
+            for (row, sums) in out.chunks_exact_mut(columns).zip(sums) {
+                let (head, _) = S::as_mut_simd_f64s(&mut row[j..j + chunk]);
+                head.copy_from_slice(&sums);
+            }
+        }
+    }
+}
+
 /// Sums over the rows of `a[i + r] · b[j..]`, two vectors wide. A matrix comes with the distance of its rows and the
 /// column to begin at.
 #[inline(always)]
@@ -277,6 +329,23 @@ mod tests {
             for i in 0..columns {
                 for j in 0..columns {
                     let expected: f64 = e.chunks_exact(columns).map(|row| row[i] * row[j]).sum();
+                    assert!((found[i * columns + j] - expected).abs() < 1e-12, "{i} {j} of {columns}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn columns_that_are_zero_are_left_out() {
+        for columns in [3, 8, 62] {
+            let (n, chosen) = (11, [1, 2, 5, 10]);
+            let (mut a, b) = (numbers(3 * n, 7), numbers(n * columns, 8));
+            (0..3 * n).filter(|i| !chosen.contains(&(i % n))).for_each(|i| a[i] = 0.0);
+            let mut found = vec![f64::NAN; 3 * columns];
+            selected_product(&a, &chosen, &b, columns, &mut found);
+            for i in 0..3 {
+                for j in 0..columns {
+                    let expected: f64 = (0..n).map(|p| a[i * n + p] * b[p * columns + j]).sum();
                     assert!((found[i * columns + j] - expected).abs() < 1e-12, "{i} {j} of {columns}");
                 }
             }

@@ -7,6 +7,20 @@ pub fn add_scaled(sum: &mut [f64], factor: f64, row: &[f64]) {
     }
 }
 
+/// `a · b`, in four lanes; of equal length.
+pub fn inner_product(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; 4];
+    let (a4, a_rest) = a.as_chunks::<4>();
+    let (b4, b_rest) = b.as_chunks::<4>();
+    for (x, y) in a4.iter().zip(b4) {
+        for i in 0..4 {
+            lanes[i] += x[i] * y[i];
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
+    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
+}
+
 /// `out[j] += Σ_k weights[k] · rows[k, j]`. `rows` has shape `[weights, out]` at a distance of `stride` numbers.
 pub fn weighted_sum(rows: &[f64], stride: usize, weights: &[f64], out: &mut [f64]) {
     assert!(weights.is_empty() || rows.len() >= (weights.len() - 1) * stride + out.len());

@@ -124,6 +124,11 @@ impl PointSet {
         self.points.is_empty()
     }
 
+    /// The coordinates that move a point, in rising order.
+    pub fn moved_by(&self, point: usize) -> &[usize] {
+        &self.dofs[point]
+    }
+
     /// World positions, metres, shape `[points]`, of coordinates `x`. Fills `state` for the joints on the way.
     pub fn positions(&self, kinematics: &Kinematics, x: &[f64], state: &mut State, out: &mut [Vector3<f64>]) {
         kinematics.update_joints(&self.joints, x, state);

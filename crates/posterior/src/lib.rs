@@ -10,7 +10,7 @@
 //!   (Woodbury, method §2, mend 5), and the inverse of Σ is never taken.
 
 mod control_points;
-mod dense;
+mod linearisation;
 mod prior;
 mod solver;
 

@@ -1,6 +1,6 @@
 use kinematics::Kinematics;
 
-use crate::dense::{cholesky, solve_lower, solve_positive_definite};
+use crate::linearisation::Linearisation;
 use crate::{ControlPoints, GaussianPrior, Measurement};
 
 /// When the solver stops.
@@ -53,11 +53,7 @@ impl Solution {
 /// where r = c − f(x) and W⁻¹ holds the variances of the measurements.
 #[derive(Debug, Clone)]
 pub struct MapSolver {
-    jacobian: Vec<f64>,
-    /// JΣ, `[rows, dofs]`
-    spread: Vec<f64>,
-    system: Vec<f64>,
-    multipliers: Vec<f64>,
+    linearisation: Linearisation,
     residuals: Vec<f64>,
     trial_residuals: Vec<f64>,
     variances: Vec<f64>,
@@ -72,10 +68,7 @@ impl MapSolver {
     pub fn new(points: usize, dofs: usize) -> Self {
         let rows = 3 * points;
         Self {
-            jacobian: vec![0.0; rows * dofs],
-            spread: vec![0.0; rows * dofs],
-            system: vec![0.0; rows * rows],
-            multipliers: vec![0.0; rows],
+            linearisation: Linearisation::new(points, dofs),
             residuals: vec![0.0; rows],
             trial_residuals: vec![0.0; rows],
             variances: vec![0.0; rows],
@@ -100,14 +93,9 @@ impl MapSolver {
         prior: &GaussianPrior,
         parameters: &SolverParameters,
     ) -> Solution {
-        let dofs = prior.mean.len();
         self.x.copy_from_slice(&prior.mean);
         self.z.fill(0.0);
-        let mut rows = 0;
-        for m in measured.iter().flatten() {
-            self.variances[rows..rows + 3].fill(m.sigma * m.sigma);
-            rows += 3;
-        }
+        let rows = self.set_variances(measured);
         let (_, mut data_energy) = likelihood.residuals(kinematics, &self.x, measured, &mut self.residuals);
         let mut prior_energy = 0.0;
         let mut damping = 0.0;
@@ -117,16 +105,20 @@ impl MapSolver {
         while steps < parameters.max_steps && rows > 0 {
             steps += 1;
             if is_new_point {
-                likelihood.jacobian(kinematics, measured, &mut self.jacobian);
-                self.spread(prior, rows, dofs);
+                self.linearisation.update(kinematics, likelihood, measured, prior);
+                is_new_point = false;
             }
-            if !self.step(prior, rows, dofs, damping) {
+            let share = 1.0 / (1.0 + damping);
+            let from = [&self.x[..], &self.z];
+            let to = [&mut self.trial_x[..], &mut self.trial_z];
+            let Some(found) =
+                self.linearisation.step(prior, &self.variances, &self.residuals, share, from, to)
+            else {
                 damping = next_damping(damping);
                 continue;
-            }
+            };
             if damping == 0.0 {
-                // The system now holds its Cholesky factor.
-                log_determinant = (0..rows).map(|i| 2.0 * self.system[i * rows + i].ln()).sum();
+                log_determinant = found;
             }
             let (_, trial_data) =
                 likelihood.residuals(kinematics, &self.trial_x, measured, &mut self.trial_residuals);
@@ -155,59 +147,14 @@ impl MapSolver {
         Solution { steps, likelihood_energy: data_energy, prior_energy, residual_m, log_determinant }
     }
 
-    /// `JΣ`, using that most of J is zero: a point is moved by its own chain only.
-    fn spread(&mut self, prior: &GaussianPrior, rows: usize, dofs: usize) {
-        for (j, out) in
-            self.jacobian[..rows * dofs].chunks_exact(dofs).zip(self.spread.chunks_exact_mut(dofs))
-        {
-            out.fill(0.0);
-            for (factor, covariance) in j.iter().zip(prior.covariance.chunks_exact(dofs)) {
-                if *factor != 0.0 {
-                    for (o, c) in out.iter_mut().zip(covariance) {
-                        *o += factor * c;
-                    }
-                }
-            }
+    /// Variances of the measured coordinates; returns their number.
+    fn set_variances(&mut self, measured: &[Option<Measurement>]) -> usize {
+        let mut rows = 0;
+        for m in measured.iter().flatten() {
+            self.variances[rows..rows + 3].fill(m.sigma * m.sigma);
+            rows += 3;
         }
-    }
-
-    /// Puts the damped step's end into `trial_x`, `trial_z`. `false` if the system cannot be solved.
-    fn step(&mut self, prior: &GaussianPrior, rows: usize, dofs: usize, damping: f64) -> bool {
-        let share = 1.0 / (1.0 + damping);
-        self.system(rows, dofs, share);
-        for i in 0..rows {
-            let j = &self.jacobian[i * dofs..][..dofs];
-            let moved: f64 = j.iter().zip(&self.x).zip(&prior.mean).map(|((j, x), m)| j * (x - m)).sum();
-            self.multipliers[i] = self.residuals[i] + share * moved;
-        }
-        if !solve_positive_definite(&mut self.system[..rows * rows], rows, &mut self.multipliers[..rows]) {
-            return false;
-        }
-        for d in 0..dofs {
-            self.trial_x[d] = self.x[d] - share * (self.x[d] - prior.mean[d]);
-            self.trial_z[d] = self.z[d] - share * self.z[d];
-        }
-        for i in 0..rows {
-            let factor = share * self.multipliers[i];
-            let (j, s) = (&self.jacobian[i * dofs..][..dofs], &self.spread[i * dofs..][..dofs]);
-            for d in 0..dofs {
-                self.trial_x[d] += factor * s[d];
-                self.trial_z[d] += factor * j[d];
-            }
-        }
-        true
-    }
-
-    /// `W⁻¹ + share · JΣJᵀ`, lower triangle.
-    fn system(&mut self, rows: usize, dofs: usize, share: f64) {
-        for i in 0..rows {
-            let s = &self.spread[i * dofs..][..dofs];
-            for k in 0..=i {
-                let j = &self.jacobian[k * dofs..][..dofs];
-                let product: f64 = s.iter().zip(j).map(|(s, j)| s * j).sum();
-                self.system[i * rows + k] = share * product + if i == k { self.variances[i] } else { 0.0 };
-            }
-        }
+        rows
     }
 
     /// Standard deviation of every coordinate under the posterior's Gaussian approximation at the solution (the
@@ -220,23 +167,11 @@ impl MapSolver {
         prior: &GaussianPrior,
         out: &mut [f64],
     ) {
-        let dofs = prior.mean.len();
-        let (rows, _) = likelihood.residuals(kinematics, &self.x, measured, &mut self.residuals);
-        likelihood.jacobian(kinematics, measured, &mut self.jacobian);
-        self.spread(prior, rows, dofs);
-        self.system(rows, dofs, 1.0);
-        let is_solved = cholesky(&mut self.system[..rows * rows], rows);
-        for (d, out) in out.iter_mut().enumerate() {
-            let mut variance = prior.covariance[d * dofs + d];
-            if is_solved {
-                for i in 0..rows {
-                    self.multipliers[i] = self.spread[i * dofs + d];
-                }
-                solve_lower(&self.system, rows, &mut self.multipliers[..rows]);
-                variance -= self.multipliers[..rows].iter().map(|v| v * v).sum::<f64>();
-            }
-            *out = variance.max(0.0).sqrt();
-        }
+        self.set_variances(measured);
+        likelihood.residuals(kinematics, &self.x, measured, &mut self.residuals);
+        self.linearisation.update(kinematics, likelihood, measured, prior);
+        self.linearisation.variances(prior, &self.variances, out);
+        out.iter_mut().for_each(|v| *v = v.max(0.0).sqrt());
     }
 }
 
