@@ -70,7 +70,7 @@ impl MotionDatabase {
             parametrisation,
             leg_length,
             clips: Vec::new(),
-            coordinates: Vec::new(),
+            coordinates: Vec::new().into(),
         };
         for clip in clips {
             database.add(clip)?;
@@ -93,7 +93,7 @@ impl MotionDatabase {
         let scale = self.leg_length / SkeletonSize::leg_length(clip.motion.skeleton());
         for pose in coordinates.chunks_exact(dofs) {
             let scaled = pose.iter().enumerate().map(|(d, v)| (if d < 3 { v * scale } else { *v }) as f32);
-            self.coordinates.extend(scaled);
+            self.coordinates.to_mut().extend(scaled);
         }
         self.clips.push(ClipInfo {
             name: clip.name.clone(),

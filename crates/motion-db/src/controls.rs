@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use crate::database::proportions;
 use crate::search::Blocks;
+use crate::segments::Segments;
 use crate::{ClipInfo, HeadingFrame, MotionDatabase, SkeletonSize, WindowIndex};
 
 /// Where a session's control points would be in every pose of a database, on the performer's own skeleton; and how
@@ -21,6 +22,45 @@ pub struct ControlTable {
     /// of each window's target pose, relative to the heading frame before it, centimetres, and last the unlikeness of
     /// its clip, `[rows, 3·points + 1]`
     pub(crate) relative: Blocks,
+    /// means of `relative` over the rows of each segment of the index, shape `[segments, 3·points + 1]`
+    of_segments: Vec<f32>,
+    /// means of those over the segments of each list, and the least unlikeness, shape `[lists, 3·points + 1]`
+    of_lists: Vec<f32>,
+}
+
+fn segment_controls(relative: &Blocks, segments: &Segments, num_rows: usize) -> Vec<f32> {
+    let dims = relative.dims();
+    let mut means = vec![0.0; segments.len() * dims];
+    let mut row_numbers = vec![0.0; dims];
+    for (segment, mean) in means.chunks_exact_mut(dims).enumerate() {
+        let rows = segments.rows(segment, num_rows);
+        let share = 1.0 / rows.len().max(1) as f64;
+        for row in rows {
+            relative.copy_row(row, &mut row_numbers);
+            mean.iter_mut().zip(&row_numbers).for_each(|(mean, v)| *mean += (share * v) as f32);
+        }
+    }
+    means
+}
+
+fn list_controls(of_segments: &[f32], dims: usize, segments: &Segments) -> Vec<f32> {
+    let mut means = vec![0.0; segments.lists.len() * dims];
+    for (list, mean) in means.chunks_exact_mut(dims).enumerate() {
+        let range = segments.lists.segments(list);
+        let share = 1.0 / range.len().max(1) as f32;
+        let mut least = f32::INFINITY;
+        for numbers in range.map(|s| &of_segments[s * dims..][..dims]) {
+            mean.iter_mut().zip(numbers).for_each(|(mean, v)| *mean += share * v);
+            least = least.min(numbers[dims - 1]);
+        }
+        // A list may hold recordings of many performers: the performer's own are not to be missed.
+        mean[dims - 1] = if least.is_finite() { least } else { 0.0 };
+    }
+    means
+}
+
+fn weighted_distance(a: &[f32], b: &[f32], weights: &[f32]) -> f32 {
+    a.iter().zip(b).zip(weights).map(|((a, b), w)| w * (a - b) * (a - b)).sum()
 }
 
 impl ControlTable {
@@ -62,7 +102,24 @@ impl ControlTable {
                 out.copy_from_slice(&[local.x as f32, local.y as f32, local.z as f32]);
             }
         });
-        Self { points: num_points, unlikeness, world, relative }
+        let (of_segments, of_lists) = index.segments.as_ref().map_or_else(Default::default, |segments| {
+            let of_segments = segment_controls(&relative, segments, index.num_rows());
+            let of_lists = list_controls(&of_segments, relative.dims(), segments);
+            (of_segments, of_lists)
+        });
+        Self { points: num_points, unlikeness, world, relative, of_segments, of_lists }
+    }
+
+    /// Squared, weighted distance of `controls` from the middle of a segment's.
+    #[inline]
+    pub(crate) fn segment_distance(&self, segment: usize, controls: &[f32], weights: &[f32]) -> f32 {
+        weighted_distance(&self.of_segments[segment * self.relative.dims()..], controls, weights)
+    }
+
+    /// Squared, weighted distance of `controls` from the middle of a list's.
+    #[inline]
+    pub(crate) fn list_distance(&self, list: usize, controls: &[f32], weights: &[f32]) -> f32 {
+        weighted_distance(&self.of_lists[list * self.relative.dims()..], controls, weights)
     }
 
     /// Number of points P.

@@ -3,6 +3,8 @@ use std::sync::Arc;
 use kinematics::{Kinematics, Parametrisation, References};
 use model::Skeleton;
 
+use crate::column::Column;
+
 /// Frames per second of every database.
 pub const FRAME_RATE: f64 = 60.0;
 
@@ -53,7 +55,7 @@ pub struct MotionDatabase {
     pub(crate) leg_length: f64,
     pub(crate) clips: Vec<ClipInfo>,
     /// shape `[poses, dofs]`
-    pub(crate) coordinates: Vec<f32>,
+    pub(crate) coordinates: Column<f32>,
 }
 
 impl MotionDatabase {

@@ -74,7 +74,7 @@ impl MotionDatabase {
         bytes.extend_from_slice(&(header.len() as u32).to_le_bytes());
         bytes.extend_from_slice(&header);
         bytes.resize(start, 0);
-        for value in &self.coordinates {
+        for value in self.coordinates.iter() {
             bytes.extend_from_slice(&value.to_le_bytes());
         }
         let checksum = blake3::hash(&bytes);
@@ -161,6 +161,13 @@ impl MotionDatabase {
             return Err(format!("coordinate {bad} is not finite"));
         }
         let leg_length = header.leg_length_m;
-        Ok(Self { skeleton: skeleton.into(), references, parametrisation, leg_length, clips, coordinates })
+        Ok(Self {
+            skeleton: skeleton.into(),
+            references,
+            parametrisation,
+            leg_length,
+            clips,
+            coordinates: coordinates.into(),
+        })
     }
 }

@@ -8,16 +8,22 @@
 
 mod augment;
 mod build;
+mod column;
 mod controls;
 mod database;
 mod error;
+mod fast;
 mod file;
 mod frame;
+mod graph;
+mod lists;
 mod mirror;
 mod parts;
 mod search;
+mod segments;
 mod start;
 mod start_scan;
+mod threads;
 mod window;
 
 pub use augment::{Augment, trial_of, warp};
@@ -25,12 +31,14 @@ pub use build::{Clip, SkeletonSize, resample};
 pub use controls::ControlTable;
 pub use database::{ClipInfo, FRAME_RATE, MotionDatabase};
 pub use error::Error;
+pub use fast::Way;
 pub use file::FORMAT_VERSION;
 pub use frame::HeadingFrame;
 pub use mirror::mirror;
 pub use search::{Neighbour, Query, Scratch};
 pub use start::{StartPose, start_poses};
 pub use start_scan::StartScan;
+pub use threads::{OneThread, Threads};
 pub use window::{FeatureScale, WindowIndex};
 
 /// Result of the fallible functions of this crate.

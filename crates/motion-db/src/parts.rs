@@ -12,7 +12,7 @@ impl MotionDatabase {
             parametrisation: self.parametrisation.clone(),
             leg_length: self.leg_length,
             clips: Vec::new(),
-            coordinates: Vec::new(),
+            coordinates: Vec::new().into(),
         }
     }
 
@@ -41,7 +41,7 @@ impl MotionDatabase {
         self.check_size(first_pose + info.num_poses)?;
         let dofs = self.num_dofs();
         let poses = info.first_pose * dofs..(info.first_pose + info.num_poses) * dofs;
-        self.coordinates.extend_from_slice(&other.coordinates[poses]);
+        self.coordinates.to_mut().extend_from_slice(&other.coordinates[poses]);
         info.first_pose = first_pose;
         info.name = name.to_owned();
         self.clips.push(info);

@@ -1,32 +1,58 @@
 use std::ops::Range;
 
+use crate::column::Column;
+use crate::fast::FastScratch;
 use crate::{ControlTable, WindowIndex};
 
 /// Number of leading principal features that bound a distance from below.
 pub(crate) const PREFIX: usize = 16;
 /// Rows of a block.
-const LANES: usize = 16;
+pub(crate) const LANES: usize = 16;
 
 /// Rows stored in blocks of 16, feature by feature, so that 16 distances grow at once.
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks {
     dims: usize,
-    data: Vec<f32>,
+    data: Column<f32>,
 }
 
 impl Blocks {
+    pub fn zeros(rows: usize, dims: usize) -> Self {
+        Self { dims, data: vec![0.0; Self::numbers(rows, dims)].into() }
+    }
+
+    /// Blocks from a file, which has [`Self::numbers`] of them.
+    pub fn from_column(dims: usize, data: Column<f32>) -> Self {
+        Self { dims, data }
+    }
+
+    /// How many numbers the blocks of so many rows hold.
+    pub fn numbers(rows: usize, dims: usize) -> usize {
+        rows.div_ceil(LANES) * LANES * dims
+    }
+
+    pub fn as_bytes(&self) -> &[u8] {
+        self.data.as_bytes()
+    }
+
     /// `fill(row, out)` gives a row's `dims` numbers.
     pub fn new(rows: usize, dims: usize, mut fill: impl FnMut(usize, &mut [f32])) -> Self {
-        let mut data = vec![0.0; rows.div_ceil(LANES) * LANES * dims];
+        let mut blocks = Self::zeros(rows, dims);
         let mut scratch = vec![0.0; dims];
         for row in 0..rows {
             fill(row, &mut scratch);
-            let block = &mut data[row / LANES * LANES * dims..][..LANES * dims];
-            for (d, v) in scratch.iter().enumerate() {
-                block[d * LANES + row % LANES] = *v;
-            }
+            blocks.set(row, &scratch);
         }
-        Self { dims, data }
+        blocks
+    }
+
+    /// Sets a row to the first `dims` of `numbers`.
+    pub fn set(&mut self, row: usize, numbers: &[f32]) {
+        let dims = self.dims;
+        let block = &mut self.data.to_mut()[row / LANES * LANES * dims..][..LANES * dims];
+        for (d, v) in numbers[..dims].iter().enumerate() {
+            block[d * LANES + row % LANES] = *v;
+        }
     }
 
     pub fn dims(&self) -> usize {
@@ -35,7 +61,13 @@ impl Blocks {
 
     /// Adds the squared, weighted distances of a block's rows to `query`.
     #[inline]
-    fn add_distances(&self, block: usize, query: &[f32], weights: Option<&[f32]>, sums: &mut [f32; LANES]) {
+    pub fn add_distances(
+        &self,
+        block: usize,
+        query: &[f32],
+        weights: Option<&[f32]>,
+        sums: &mut [f32; LANES],
+    ) {
         let data = &self.data[block * LANES * self.dims..][..LANES * self.dims];
         let (columns, _) = data.as_chunks::<LANES>();
         match weights {
@@ -92,21 +124,30 @@ pub struct Query<'a> {
     pub controls: Option<(&'a ControlTable, &'a [f32], &'a [f32])>,
     /// rows that may not be found (the trial under test), in rising order
     pub exclude: &'a [Range<usize>],
-    /// rows likely to be near (the successors of the last matches), in rising order: they only speed the search up
+    /// rows likely to be near (the successors of the last matches), in rising order: they only speed the exact search
+    /// up; the fast search starts from them
     pub hints: &'a [usize],
+}
+
+impl Query<'_> {
+    pub(crate) fn excludes(&self, row: usize) -> bool {
+        let after = self.exclude.partition_point(|r| r.end <= row);
+        self.exclude.get(after).is_some_and(|r| r.contains(&row))
+    }
 }
 
 /// Memory of a search, kept from one to the next.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
-    heap: std::collections::BinaryHeap<Candidate>,
+    pub(crate) heap: std::collections::BinaryHeap<Candidate>,
+    pub(crate) fast: FastScratch,
 }
 
 /// Ordered by distance, then row: the order in which results come does not depend on how they were found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Candidate {
-    distance: f32,
-    row: u32,
+pub(crate) struct Candidate {
+    pub distance: f32,
+    pub row: u32,
 }
 
 impl Eq for Candidate {}
@@ -123,6 +164,17 @@ impl Ord for Candidate {
     }
 }
 
+pub(crate) fn drain_nearest_first(
+    heap: &mut std::collections::BinaryHeap<Candidate>,
+    out: &mut Vec<Neighbour>,
+) {
+    out.extend(
+        heap.drain().map(|c| Neighbour { row: c.row as usize, distance_squared: f64::from(c.distance) }),
+    );
+    // No two are equal: the order is that of a stable sort, which would take memory.
+    out.sort_unstable_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared).then(a.row.cmp(&b.row)));
+}
+
 impl WindowIndex {
     /// The `k` nearest windows, nearest first: exact, by one scan of the leading principal features with the rest of
     /// a row read only where these cannot rule it out.
@@ -133,10 +185,7 @@ impl WindowIndex {
         if k == 0 {
             return;
         }
-        let is_excluded = |row: usize| {
-            let after = query.exclude.partition_point(|r| r.end <= row);
-            query.exclude.get(after).is_some_and(|r| r.contains(&row))
-        };
+        let is_excluded = |row: usize| query.excludes(row);
         let head = &query.features[..self.prefix.dims()];
         let bounds = |block: usize| {
             let mut sums = [0.0; LANES];
@@ -195,15 +244,12 @@ impl WindowIndex {
                 }
             }
         }
-        out.extend(
-            heap.drain().map(|c| Neighbour { row: c.row as usize, distance_squared: f64::from(c.distance) }),
-        );
-        out.sort_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared).then(a.row.cmp(&b.row)));
+        drain_nearest_first(heap, out);
     }
 
     /// Adds the features behind the prefix to `start`; stops (with what it has, above `limit`) once it is too far.
     #[inline]
-    fn full_distance(&self, row: usize, query: &[f32], start: f32, limit: f32) -> f32 {
+    pub(crate) fn full_distance(&self, row: usize, query: &[f32], start: f32, limit: f32) -> f32 {
         let skip = self.prefix.dims();
         let (a, a_rest) = self.features(row)[skip..].as_chunks::<16>();
         let (b, b_rest) = query[skip..].as_chunks::<16>();

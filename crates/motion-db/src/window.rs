@@ -2,13 +2,20 @@ use std::ops::Range;
 
 use faer::Mat;
 
+use crate::column::Column;
 use crate::search::{Blocks, PREFIX};
-use crate::{Error, HeadingFrame, MotionDatabase, Result};
+use crate::segments::{Cutter, Segments, squared_distance};
+use crate::{Error, HeadingFrame, MotionDatabase, OneThread, Result, Threads};
 
 /// Longest window, frames.
 const MAX_WINDOW: usize = 16;
 /// Number of windows that the principal axes are learned from, at most.
 const AXES_SAMPLE: usize = 20_000;
+/// Number of windows whose distance to the next is looked at, at most.
+const STEPS_SAMPLE: usize = 4_096;
+/// Windows that are worked out together, and by one thread.
+const ROWS_A_BATCH: usize = 8_192;
+const ROWS_A_PIECE: usize = 256;
 
 /// What one unit of a feature is worth: angles count in degrees, translations in centimetres (scaled to the
 /// database's leg length), so that 1° and 1 cm weigh the same.
@@ -48,23 +55,26 @@ impl FeatureScale {
 ///
 /// A *row* is one window `Q_{t,m}` together with its target, the pose t. Features are centred and rotated to their
 /// principal axes: distances and inner products stay what they were, and the leading numbers of a row are a
-/// lower bound of its distance, which makes the exact search fast.
+/// lower bound of its distance, which makes the exact search fast. For the fast search ([`Self::nearest_fast`]), rows
+/// that follow one another are grouped, the groups sorted into lists and joined to a graph.
 #[derive(Debug, Clone)]
 pub struct WindowIndex {
-    window: usize,
-    scale: FeatureScale,
+    pub(crate) window: usize,
+    pub(crate) scale: FeatureScale,
     /// shape `[width]`
-    mean: Vec<f64>,
+    pub(crate) mean: Vec<f64>,
     /// rows are principal axes, strongest first, shape `[width, width]`
-    axes: Vec<f64>,
+    pub(crate) axes: Vec<f64>,
     /// target pose of each row
-    targets: Vec<u32>,
+    pub(crate) targets: Vec<u32>,
     /// rows of each clip
-    clip_rows: Vec<Range<u32>>,
+    pub(crate) clip_rows: Vec<Range<u32>>,
     /// leading features, in blocks for the scan
     pub(crate) prefix: Blocks,
     /// all features, shape `[rows, width]`
-    features: Vec<f32>,
+    pub(crate) features: Column<f32>,
+    /// what the fast search goes by; `None` if there are too few rows to be worth it
+    pub(crate) segments: Option<Segments>,
 }
 
 impl WindowIndex {
@@ -73,28 +83,66 @@ impl WindowIndex {
     /// # Errors
     /// [`Error::Window`] if no clip is longer than the window, or the window is longer than 16 frames.
     pub fn new(database: &MotionDatabase, window: usize) -> Result<Self> {
-        let longest = database.clips().iter().map(|c| c.num_poses).max().unwrap_or(0);
-        let max = MAX_WINDOW.min(longest.saturating_sub(1));
-        if window == 0 || window > max {
-            return Err(Error::Window { found: window, max });
-        }
+        Self::with_threads(database, window, &OneThread)
+    }
+
+    /// As [`Self::new`], by several threads; the index is the same.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_threads(database: &MotionDatabase, window: usize, threads: &impl Threads) -> Result<Self> {
+        let mut features = Vec::new();
+        let mut index = Self::without_features(database, window, threads, &mut |rows| {
+            if features.is_empty() {
+                // All at once: a vector that grows would take twice as much.
+                features.reserve_exact(count_rows(database, window) * window * database.num_dofs());
+            }
+            features.extend_from_slice(rows);
+            Ok(())
+        })?;
+        index.features = features.into();
+        Ok(index)
+    }
+
+    /// The index with its features not kept but given to `emit`, a batch of rows after the other: `features` stays
+    /// empty. What is kept is a fifth as large.
+    pub(crate) fn without_features(
+        database: &MotionDatabase,
+        window: usize,
+        threads: &impl Threads,
+        emit: &mut dyn FnMut(&[f32]) -> Result<()>,
+    ) -> Result<Self> {
+        check_window(database, window)?;
         let scale = FeatureScale::of(database);
         let width = window * database.num_dofs();
         let (targets, clip_rows) = rows(database, window);
         let raw = RawWindows { database, scale: &scale, window };
         let (mean, axes) = principal_axes(&raw, &targets, width);
-        let mut features = Vec::with_capacity(targets.len() * width);
-        let mut scratch = vec![0.0; width];
-        let mut rotated = vec![0.0; width];
-        for &target in &targets {
-            raw.features(target as usize, &mut scratch);
-            rotate(&mean, &axes, &mut scratch, &mut rotated);
-            features.extend(rotated.iter().map(|v| *v as f32));
+        let mut cutter = Cutter::new(width, median_step(&raw, &targets, width));
+        let mut prefix = Blocks::zeros(targets.len(), PREFIX.min(width));
+        let mut batch = vec![0.0f32; ROWS_A_BATCH.min(targets.len()) * width];
+        for (start, targets) in (0..).step_by(ROWS_A_BATCH).zip(targets.chunks(ROWS_A_BATCH)) {
+            let batch = &mut batch[..targets.len() * width];
+            threads.for_each_piece(batch, ROWS_A_PIECE * width, |piece, out| {
+                let mut memory = RawMemory::new(&raw);
+                let mut rotated = vec![0.0; width];
+                for (target, out) in targets[piece * ROWS_A_PIECE..].iter().zip(out.chunks_exact_mut(width)) {
+                    let features = raw.features(*target as usize, &mut memory);
+                    rotate(&mean, &axes, features, &mut rotated);
+                    out.iter_mut().zip(&rotated).for_each(|(out, v)| *out = *v as f32);
+                }
+            });
+            for (i, row) in batch.chunks_exact(width).enumerate() {
+                prefix.set(start + i, row);
+                let continues = i > 0 && targets[i] == targets[i - 1] + 1;
+                cutter.add(row, continues);
+            }
+            emit(batch)?;
         }
-        let prefix = Blocks::new(targets.len(), PREFIX.min(width), |row, out| {
-            out.copy_from_slice(&features[row * width..][..out.len()]);
-        });
-        Ok(Self { window, scale, mean, axes, targets, clip_rows, prefix, features })
+        drop(batch);
+        let segments = cutter.finish(threads);
+        let features = Vec::new().into();
+        Ok(Self { window, scale, mean, axes, targets, clip_rows, prefix, features, segments })
     }
 
     /// Length of the windows m, frames.
@@ -154,24 +202,49 @@ struct RawWindows<'a> {
     window: usize,
 }
 
-impl RawWindows<'_> {
-    fn features(&self, target: usize, out: &mut [f64]) {
-        let dofs = self.database.num_dofs();
-        let mut newest = vec![0.0; dofs];
-        self.database.copy_pose(target - 1, &mut newest);
-        let frame = HeadingFrame::of(&newest);
-        let mut pose = vec![0.0; dofs];
-        for (i, out) in (1..=self.window).zip(out.chunks_exact_mut(dofs)) {
-            self.database.copy_pose(target - i, &mut pose);
-            frame.relative(&pose, out);
-            self.scale.scale(out);
-        }
+/// Memory for [`RawWindows::features`].
+struct RawMemory {
+    newest: Vec<f64>,
+    pose: Vec<f64>,
+    features: Vec<f64>,
+}
+
+impl RawMemory {
+    fn new(raw: &RawWindows<'_>) -> Self {
+        let dofs = raw.database.num_dofs();
+        Self { newest: vec![0.0; dofs], pose: vec![0.0; dofs], features: vec![0.0; raw.window * dofs] }
     }
 }
 
-fn rows(database: &MotionDatabase, window: usize) -> (Vec<u32>, Vec<Range<u32>>) {
-    let mut targets = Vec::new();
-    let mut clip_rows = Vec::new();
+impl RawWindows<'_> {
+    fn features<'m>(&self, target: usize, memory: &'m mut RawMemory) -> &'m mut [f64] {
+        self.database.copy_pose(target - 1, &mut memory.newest);
+        let frame = HeadingFrame::of(&memory.newest);
+        let dofs = self.database.num_dofs();
+        for (i, out) in (1..=self.window).zip(memory.features.chunks_exact_mut(dofs)) {
+            self.database.copy_pose(target - i, &mut memory.pose);
+            frame.relative(&memory.pose, out);
+            self.scale.scale(out);
+        }
+        &mut memory.features
+    }
+}
+
+pub(crate) fn check_window(database: &MotionDatabase, window: usize) -> Result<()> {
+    let longest = database.clips().iter().map(|c| c.num_poses).max().unwrap_or(0);
+    let max = MAX_WINDOW.min(longest.saturating_sub(1));
+    if window == 0 || window > max { Err(Error::Window { found: window, max }) } else { Ok(()) }
+}
+
+/// Number of windows of `window` frames.
+pub(crate) fn count_rows(database: &MotionDatabase, window: usize) -> usize {
+    database.clips().iter().map(|c| c.num_poses.saturating_sub(window)).sum()
+}
+
+/// Target of each row, and the rows of each clip.
+pub(crate) fn rows(database: &MotionDatabase, window: usize) -> (Vec<u32>, Vec<Range<u32>>) {
+    let mut targets = Vec::with_capacity(count_rows(database, window));
+    let mut clip_rows = Vec::with_capacity(database.clips().len());
     for clip in database.clips() {
         let first = targets.len() as u32;
         let end = clip.first_pose + clip.num_poses;
@@ -181,16 +254,29 @@ fn rows(database: &MotionDatabase, window: usize) -> (Vec<u32>, Vec<Range<u32>>)
     (targets, clip_rows)
 }
 
+/// Median distance between a window and the next of its clip.
+fn median_step(raw: &RawWindows<'_>, targets: &[u32], width: usize) -> f32 {
+    let mut memory = RawMemory::new(raw);
+    let mut single = |target: u32| -> Vec<f32> {
+        raw.features(target as usize, &mut memory).iter().map(|v| *v as f32).collect()
+    };
+    let every = targets.len().div_ceil(STEPS_SAMPLE).max(1);
+    let pairs = targets.windows(2).step_by(every).filter(|pair| pair[1] == pair[0] + 1);
+    let mut steps: Vec<f32> =
+        pairs.map(|pair| squared_distance(&single(pair[0]), &single(pair[1])).sqrt()).collect();
+    steps.sort_by(f32::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(width as f32)
+}
+
 /// Mean and principal axes (rows, strongest first) of the windows.
 fn principal_axes(raw: &RawWindows<'_>, targets: &[u32], width: usize) -> (Vec<f64>, Vec<f64>) {
     let step = targets.len().div_ceil(AXES_SAMPLE).max(1);
     let sample: Vec<u32> = targets.iter().copied().step_by(step).collect();
     let mut windows = Mat::<f64>::zeros(width, sample.len());
     let mut mean = vec![0.0; width];
-    let mut scratch = vec![0.0; width];
+    let mut memory = RawMemory::new(raw);
     for (column, &target) in sample.iter().enumerate() {
-        raw.features(target as usize, &mut scratch);
-        for (i, v) in scratch.iter().enumerate() {
+        for (i, v) in raw.features(target as usize, &mut memory).iter().enumerate() {
             windows[(i, column)] = *v;
             mean[i] += v / sample.len() as f64;
         }
