@@ -97,17 +97,28 @@ pub(crate) enum CallError {
     Prior(#[source] JobError),
     #[error("database: {0}")]
     Catalogue(#[from] sqlx::Error),
+    #[error("too many live streams: this service follows {limit} at once")]
+    TooManyStreams { limit: usize },
+    #[error("this service is shutting down")]
+    ShuttingDown,
+    #[error("no thread for a live stream: {0}")]
+    NoThread(#[source] std::io::Error),
+    #[error("the thread of a live stream panicked")]
+    Panicked,
 }
 
 impl CallError {
     fn code(&self) -> ErrorCode {
         match self {
             Self::Input(InputError::Sparse(sparse::Error::Stopped { .. })) => ErrorCode::Cancelled,
-            Self::Input(InputError::TooLong { .. }) => ErrorCode::TooLarge,
+            Self::Input(InputError::TooLong { .. }) | Self::TooManyStreams { .. } | Self::NoThread(_) => {
+                ErrorCode::TooLarge
+            }
+            Self::Panicked => ErrorCode::Internal,
             Self::Request(_) | Self::Input(_) => ErrorCode::InvalidInput,
             Self::NoSuchDatabase(_) => ErrorCode::NotFound,
             Self::Prior(JobError::GiveUp { .. }) => ErrorCode::NotReady,
-            Self::Prior(_) | Self::Catalogue(_) => ErrorCode::Unavailable,
+            Self::Prior(_) | Self::Catalogue(_) | Self::ShuttingDown => ErrorCode::Unavailable,
         }
     }
 }

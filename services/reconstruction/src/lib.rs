@@ -1,6 +1,6 @@
 //! The reconstruction service: full-body motion from control points.
 //!
-//! [`start`] runs the gRPC server (`marey.v1.Reconstruction`, health, reflection) and claims three kinds of job:
+//! [`start`] runs the gRPC server (`marey.v1.Reconstruction`, `marey.v1.Live`, health, reflection) and claims three kinds of job:
 //!
 //! ```text
 //! plan-sparse ──► reconstruct-chunk × n ──► merge-chunks
@@ -15,6 +15,7 @@ mod error;
 mod evaluate;
 mod export;
 mod inputs;
+mod live;
 mod merge_job;
 mod payload;
 mod plan_job;
@@ -26,7 +27,7 @@ pub use error::InputError;
 pub use payload::{InputFile, MergeChunks, MotionDatabaseFile, Object, PlanSparse, ReconstructChunk};
 
 use priors::Priors;
-use proto::v1::reconstruction_server::ReconstructionServer;
+use proto::v1::{live_server::LiveServer, reconstruction_server::ReconstructionServer};
 use service::{Config, Parts, Running};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
@@ -72,7 +73,9 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
         memory: config.memory.clone(),
         worker_name: config.worker.name(NAME),
     });
-    let routes = Routes::new(ReconstructionServer::new(rpc::Rpc::new(shared.clone())));
+    let live = live::LiveRpc::new(shared.clone(), config.live.clone(), shutdown.clone());
+    let live = LiveServer::new(live).max_decoding_message_size(live::MAX_REQUEST_BYTES);
+    let routes = Routes::new(ReconstructionServer::new(rpc::Rpc::new(shared.clone()))).add_service(live);
     let builder = config.worker.builder(NAME, &pool).map(|builder| {
         builder
             .handler(plan_job::PlanHandler::new(shared.clone()))
@@ -81,7 +84,7 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
     });
     let parts = Parts {
         name: NAME,
-        grpc_names: &["marey.v1.Reconstruction"],
+        grpc_names: &["marey.v1.Reconstruction", "marey.v1.Live"],
         routes,
         descriptors: proto::FILE_DESCRIPTOR_SET,
         worker: builder.map(|b| move |stop| b.start(stop)),

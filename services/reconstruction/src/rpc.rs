@@ -46,7 +46,7 @@ impl Rpc {
             return Err(out_of_range("length of the frames in seconds", seconds, "at most 20").into());
         }
         let trajectories = proto::points::trajectories(&request.frames, rate)?;
-        let file = self.find(id).await?;
+        let file = self.shared.motion_database(id).await?;
         let parameters = Parameters::default();
         let prior = self.shared.priors.get(&file, parameters.window).await.map_err(CallError::Prior)?;
         // A failure to get a slot would mean that the semaphore was closed, which nobody does.
@@ -59,12 +59,15 @@ impl Rpc {
         })
         .await
     }
+}
 
-    async fn find(&self, id: Uuid) -> Result<MotionDatabaseFile, CallError> {
+impl Shared {
+    /// A motion database that is ready.
+    pub(crate) async fn motion_database(&self, id: Uuid) -> Result<MotionDatabaseFile, CallError> {
         let sql = "SELECT id, name, version, store_key, blake3 FROM motion_databases
                    WHERE id = $1 AND store_key IS NOT NULL";
         let row: Option<(Uuid, String, i32, String, String)> =
-            sqlx::query_as(sql).bind(id).fetch_optional(&self.shared.pool).await?;
+            sqlx::query_as(sql).bind(id).fetch_optional(&self.pool).await?;
         let (id, name, version, store_key, blake3) = row.ok_or(CallError::NoSuchDatabase(id))?;
         Ok(MotionDatabaseFile { id, name, version, store_key, blake3 })
     }
