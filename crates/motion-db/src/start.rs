@@ -26,7 +26,7 @@ pub(crate) const DISTINCT_FRAMES: usize = 6;
 /// `observed`: world positions (metres), shape `[offsets, points]`, `None` where not measured; `history`: number of
 /// frames that must come before the pose in its clip; `skeleton_weight`: metres that a metre of unlikeness between
 /// skeletons counts for; `exclude`: ranges of poses not to be used, in rising order.
-/// Best first, at most `count`, no two within 6 frames of each other.
+/// Best first, at most `count`, no two of one clip within 6 frames of each other.
 #[expect(
     clippy::too_many_arguments,
     reason = "two data sets, one observation, three limits: each named above"
@@ -61,7 +61,11 @@ pub fn start_poses(
         if chosen.len() == count {
             break;
         }
-        if chosen.iter().all(|c| c.pose.abs_diff(start.pose) > DISTINCT_FRAMES) {
+        let is_distinct = |c: &StartPose| {
+            c.pose.abs_diff(start.pose) > DISTINCT_FRAMES
+                || database.clip_of(c.pose) != database.clip_of(start.pose)
+        };
+        if chosen.iter().all(is_distinct) {
             chosen.push(start);
         }
     }

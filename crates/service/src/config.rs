@@ -12,6 +12,9 @@
 //! | `MAREY_DATABASE_CACHE_BYTES` | 2 GiB | motion databases kept in memory |
 //! | `MAREY_MAX_OBJECT_BYTES` | 1 GiB | largest object read into memory |
 //! | `MAREY_MAX_INPUT_BYTES` | 8 GiB | unpacked motion files of one motion database |
+//! | `MAREY_MAX_BUILD_BYTES` | 2 GiB | what one job of building a motion database keeps: an archive unpacked, or an index |
+//! | `MAREY_MOTION_INDEX_PEERS` | none | addresses of all motion-index replicas, `http://a:50051,http://b:50051` |
+//! | `MAREY_MOTION_INDEX_SELF` | none | which of them this one is |
 //! | `MAREY_MAX_SESSION_FRAMES` | 432000 | frames of one session at 60 a second: two hours |
 //! | `MAREY_LIVE_STREAMS` | 8 a core | live streams at once |
 //! | `MAREY_LIVE_IDLE_SECS` | 60 | a live stream without frames, or whose poses nobody reads, ends after so long |
@@ -37,6 +40,18 @@ pub struct Config {
     pub memory: MemoryConfig,
     /// Live streams.
     pub live: LiveConfig,
+    /// Other replicas.
+    pub peers: PeersConfig,
+}
+
+/// The replicas of motion-index that share the shards of large databases among themselves.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct PeersConfig {
+    /// Addresses of all of them, this one's too, such as `http://10.0.0.7:50051`; the same on each. None: this one
+    /// answers alone.
+    pub all: Vec<String>,
+    /// Which of them this one is; without it, it asks itself over the network.
+    pub own: Option<String>,
 }
 
 /// How to reach PostgreSQL.
@@ -99,6 +114,9 @@ pub struct MemoryConfig {
     pub max_object_bytes: u64,
     /// Unpacked motion files of one motion database, bytes. Default 8 GiB: all of the CMU library is 5.
     pub max_input_bytes: u64,
+    /// What one job of building a motion database keeps in memory, bytes: an archive unpacked, or an index file and its
+    /// poses. Default 2 GiB: 4 million poses of 62 numbers.
+    pub max_build_bytes: u64,
     /// Frames of one session at 60 a second. Default 432 000, two hours: putting it together takes about 4 kB a frame.
     pub max_session_frames: usize,
 }
@@ -143,9 +161,11 @@ impl Config {
                 database_cache_bytes: 2 * GIB,
                 max_object_bytes: GIB,
                 max_input_bytes: 8 * GIB,
+                max_build_bytes: 2 * GIB,
                 max_session_frames: 2 * 60 * 60 * 60,
             },
             live: LiveConfig::default(),
+            peers: PeersConfig::default(),
         }
     }
 
@@ -169,7 +189,10 @@ impl Config {
         vars.set("MAREY_DATABASE_CACHE_BYTES", &mut config.memory.database_cache_bytes)?;
         vars.set("MAREY_MAX_OBJECT_BYTES", &mut config.memory.max_object_bytes)?;
         vars.set("MAREY_MAX_INPUT_BYTES", &mut config.memory.max_input_bytes)?;
+        vars.set("MAREY_MAX_BUILD_BYTES", &mut config.memory.max_build_bytes)?;
         vars.set("MAREY_MAX_SESSION_FRAMES", &mut config.memory.max_session_frames)?;
+        config.peers.all = vars.list("MAREY_MOTION_INDEX_PEERS");
+        config.peers.own = vars.get("MAREY_MOTION_INDEX_SELF");
         vars.set("MAREY_LIVE_STREAMS", &mut config.live.max_streams)?;
         let mut idle_secs = config.live.idle_timeout.as_secs();
         vars.set("MAREY_LIVE_IDLE_SECS", &mut idle_secs)?;
@@ -212,6 +235,12 @@ impl<'a> Variables<'a> {
 
     fn get(&self, name: &str) -> Option<String> {
         (self.read)(name).filter(|value| !value.is_empty())
+    }
+
+    /// What stands between commas.
+    fn list(&self, name: &str) -> Vec<String> {
+        let text = self.get(name).unwrap_or_default();
+        text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(str::to_owned).collect()
     }
 
     fn required(&self, name: &'static str, expected: &'static str) -> Result<String, Error> {

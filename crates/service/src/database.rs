@@ -60,7 +60,7 @@ pub async fn is_reachable(pool: &PgPool) -> Result<(), sqlx::Error> {
 
 async fn has_schema(pool: &PgPool) -> Result<bool, sqlx::Error> {
     sqlx::query_scalar(
-        "SELECT to_regclass('jobs') IS NOT NULL AND to_regclass('motion_databases') IS NOT NULL",
+        "SELECT to_regclass('jobs') IS NOT NULL AND to_regclass('motion_database_models') IS NOT NULL",
     )
     .fetch_one(pool)
     .await

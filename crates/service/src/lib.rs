@@ -10,6 +10,7 @@ pub mod config;
 pub mod database;
 mod error;
 mod health;
+pub mod motion_database;
 pub mod objects;
 mod server;
 pub mod shutdown;

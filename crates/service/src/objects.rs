@@ -75,10 +75,15 @@ pub async fn write_result(
 
 /// Removes what earlier attempts at the job left. Failing to is no reason to fail the job.
 pub async fn clean_up_earlier_attempts(store: &Store, job: &JobContext) {
+    clean_up_earlier_attempts_under(store, job, &key::job_prefix(job.run_id().0, job.id().0)).await;
+}
+
+/// Removes what earlier attempts at the job left under `prefix`, a job's of [`store::key`].
+pub async fn clean_up_earlier_attempts_under(store: &Store, job: &JobContext, prefix: &Key) {
     if job.lease_number().0 <= 1 {
         return;
     }
-    match store.remove_earlier_leases(job.run_id().0, job.id().0, job.lease_number().0).await {
+    match store.remove_earlier_leases(prefix, job.lease_number().0).await {
         Ok(0) => {}
         Ok(removed) => tracing::info!(job.id = job.id().0, removed, "removed what lost attempts left"),
         Err(error) => tracing::warn!(job.id = job.id().0, %error, "could not remove what lost attempts left"),

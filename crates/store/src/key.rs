@@ -4,7 +4,7 @@
 //! files/{project}/{session}/{file}                 an upload
 //! runs/{run}/{job}/{lease}/{name}                  an artefact or result of a job
 //! motion-databases/{database}/inputs/{file}        an upload for a motion database
-//! motion-databases/{database}/{lease}.mdb          the index built from them
+//! motion-databases/{database}/{job}/{lease}/{name} an index file, list of them or model that a job made
 //! ```
 //!
 //! What jobs write contains the lease number of the claim that wrote it, so a worker that lost its lease
@@ -75,9 +75,17 @@ pub fn motion_database_input(database: Uuid, file: Uuid) -> Key {
     Key(format!("motion-databases/{database}/inputs/{file}"))
 }
 
-/// The index of a motion database, written under lease number `lease`.
-pub fn motion_database(database: Uuid, lease: i64) -> Key {
-    Key(format!("motion-databases/{database}/{lease}.mdb"))
+/// An index file, a list of such or a model of a motion database, which `job` writes under lease number `lease`.
+///
+/// # Errors
+/// [`Error::BadKey`] if `name` is not a plain file name.
+pub fn motion_database(database: Uuid, job: i64, lease: i64, name: &str) -> Result<Key, Error> {
+    under(&format!("motion-databases/{database}/{job}/{lease}"), name)
+}
+
+/// Prefix of everything that one job wrote for a motion database.
+pub fn motion_database_job_prefix(database: Uuid, job: i64) -> Key {
+    Key(format!("motion-databases/{database}/{job}"))
 }
 
 /// An artefact that `job` of `run` writes under lease number `lease`.
@@ -85,10 +93,14 @@ pub fn motion_database(database: Uuid, lease: i64) -> Key {
 /// # Errors
 /// [`Error::BadKey`] if `name` is not a plain file name.
 pub fn artefact(run: Uuid, job: i64, lease: i64, name: &str) -> Result<Key, Error> {
+    under(&format!("runs/{run}/{job}/{lease}"), name)
+}
+
+fn under(folder: &str, name: &str) -> Result<Key, Error> {
     if name.contains('/') {
         return Err(Error::BadKey { found: name.chars().take(80).collect() });
     }
-    format!("runs/{run}/{job}/{lease}/{name}").parse()
+    format!("{folder}/{name}").parse()
 }
 
 /// Prefix of everything a run wrote.

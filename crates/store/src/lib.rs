@@ -9,7 +9,7 @@
 //! use store::{Location, Store, key};
 //! let folder = tempfile::tempdir().unwrap();
 //! let store = Store::open(&Location::folder(folder.path())).unwrap();
-//! let key = key::motion_database(uuid::Uuid::nil(), 1);
+//! let key = key::motion_database(uuid::Uuid::nil(), 42, 1, "index.mdb").unwrap();
 //! let stored = store.put(&key, "bytes of an index".into()).await.unwrap();
 //! assert_eq!(stored.bytes, 17);
 //! assert_eq!(store.get_checked(&key, &stored.blake3, 1024).await.unwrap(), "bytes of an index");

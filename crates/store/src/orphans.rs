@@ -1,9 +1,8 @@
 //! Removing what lost attempts left behind.
 
-use crate::{Error, Key, Store, key};
+use crate::{Error, Key, Store};
 use futures::TryStreamExt;
 use std::collections::HashSet;
-use uuid::Uuid;
 
 impl Store {
     /// Removes every object under `prefix` whose key is not in `keep`; returns how many.
@@ -33,16 +32,16 @@ impl Store {
 }
 
 impl Store {
-    /// Removes what earlier attempts at a job left: everything it wrote under lease numbers below `lease`.
+    /// Removes what earlier attempts at a job left: everything under `prefix` (a job's, of [`crate::key`]) that it wrote
+    /// under lease numbers below `lease`.
     ///
     /// Safe whenever the job was claimed under `lease`: an attempt under a lower number can't complete any more.
     ///
     /// # Errors
     /// [`Error::Backend`]; objects removed until then stay removed.
-    pub async fn remove_earlier_leases(&self, run: Uuid, job: i64, lease: i64) -> Result<usize, Error> {
+    pub async fn remove_earlier_leases(&self, prefix: &Key, lease: i64) -> Result<usize, Error> {
         let mut removed = 0;
-        let prefix = key::job_prefix(run, job);
-        let found: Vec<Key> = self.list(&prefix).map_ok(|(key, _)| key).try_collect().await?;
+        let found: Vec<Key> = self.list(prefix).map_ok(|(key, _)| key).try_collect().await?;
         for key in found {
             let rest = key.as_str().strip_prefix(prefix.as_str()).and_then(|rest| rest.strip_prefix('/'));
             let of = rest.and_then(|rest| rest.split('/').next()).and_then(|of| of.parse::<i64>().ok());

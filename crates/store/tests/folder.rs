@@ -173,7 +173,7 @@ async fn what_earlier_attempts_left_is_removed_and_nothing_else() {
         let key = store::key::artefact(run, job, lease, "chunk.bin").unwrap();
         store.put(&key, Bytes::from_static(b"x")).await.unwrap();
     }
-    assert_eq!(store.remove_earlier_leases(run, 7, 10).await.unwrap(), 2);
+    assert_eq!(store.remove_earlier_leases(&store::key::job_prefix(run, 7), 10).await.unwrap(), 2);
     let left = files_in(folder.path())
         .into_iter()
         .map(|f| f.split('/').skip(2).take(2).collect::<Vec<_>>().join("/"));

@@ -1,15 +1,23 @@
-//! The job that builds a motion database.
+//! The job that puts the parts of a motion database together and writes its index files.
 
 use crate::{
-    BUILD_MOTION_DATABASE, inputs,
-    payload::{BuildMotionDatabase, InputFile},
+    BUILD_MOTION_DATABASE,
+    contents::{Clip, Contents, shares, shortened},
+    payload::BuildMotionDatabase,
+    plan_job::no_database,
+    shards,
+    sources::Sources,
 };
-use bytes::Bytes;
 use motion_db::MotionDatabase;
 use queue::{Handler, JobContext, JobError, Outcome};
 use serde::Serialize;
-use service::{compute, config::MemoryConfig, objects};
-use sqlx::PgConnection;
+use service::{
+    compute,
+    config::MemoryConfig,
+    motion_database::{INDEX, SHARDS, Shard, ShardList, ShardedClip},
+    objects,
+};
+use sqlx::{PgConnection, PgPool, types::Json};
 use store::{Store, Stored, key};
 use uuid::Uuid;
 
@@ -18,12 +26,13 @@ const SUMMARY: &str = "summary.json";
 
 pub(crate) struct BuildHandler {
     store: Store,
+    pool: PgPool,
     memory: MemoryConfig,
 }
 
 impl BuildHandler {
-    pub fn new(store: Store, memory: MemoryConfig) -> Self {
-        Self { store, memory }
+    pub fn new(store: Store, pool: PgPool, memory: MemoryConfig) -> Self {
+        Self { store, pool, memory }
     }
 }
 
@@ -33,21 +42,30 @@ impl Handler for BuildHandler {
     }
 
     async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        objects::clean_up_earlier_attempts(&self.store, &job).await;
         let payload: BuildMotionDatabase = job.payload()?;
         let id = payload.motion_database.id;
-        let files = self.fetch(&job, &payload.files).await?;
-        job.progress(0.2, "reading motion files");
-        let (limits, of) = (inputs::Limits { unpacked_bytes: self.memory.max_input_bytes }, job.clone());
-        let built = compute::run(move || build(files, limits, &of)).await?;
+        objects::clean_up_earlier_attempts(&self.store, &job).await;
+        let own = key::motion_database_job_prefix(id, job.id().0);
+        objects::clean_up_earlier_attempts_under(&self.store, &job, &own).await;
+        job.progress(0.0, "listing clips");
+        let sources =
+            Sources::of(&job, &self.store, &self.pool, &payload, self.memory.max_build_bytes).await?;
+        let written = self.write(&job, &payload, &sources).await?;
         job.check()?;
-        job.progress(0.9, "storing the index");
-        let key = key::motion_database(id, job.lease_number().0);
-        let stored = self.store.put(&key, built.bytes).await.map_err(JobError::retry)?;
-        let summary = serde_json::to_vec_pretty(&built.summary).map_err(JobError::retry)?;
+        let clips: Vec<Clip> = sources.clips.into_iter().map(|listed| listed.clip).collect();
+        let contents = Contents {
+            frame_rate_hz: motion_db::FRAME_RATE,
+            num_joints: written.num_joints,
+            num_dofs: written.num_dofs,
+            actions: shares(&clips, |clip| &clip.action),
+            subjects: shares(&clips, |clip| &clip.subject),
+            augment: payload.augment,
+            warnings: shortened(sources.warnings),
+        };
+        let num_poses = clips.iter().map(|clip| clip.num_poses).sum();
+        let ready = Ready { id, written, num_poses, contents, clips };
+        let summary = serde_json::to_vec_pretty(&Summary::of(&ready)).map_err(JobError::retry)?;
         let summary = objects::write_result(&self.store, &job, SUMMARY, "application/json", summary).await?;
-        let Summary { num_poses, skeleton, clips, .. } = built.summary;
-        let ready = Ready { id, stored, num_poses, num_clips: clips.len(), skeleton };
         Ok(Outcome::default().artefact(summary).on_complete(move |connection| {
             let ready = ready.clone();
             Box::pin(async move { set_ready(connection, &ready).await })
@@ -55,103 +73,197 @@ impl Handler for BuildHandler {
     }
 }
 
-impl BuildHandler {
-    async fn fetch(&self, job: &JobContext, files: &[InputFile]) -> Result<Vec<(String, Bytes)>, JobError> {
-        let total: u64 = files.iter().map(|f| f.bytes).sum();
-        let limit = self.memory.max_input_bytes;
-        if total > limit {
-            let message = format!("files have {total} bytes together, expected at most {limit}");
-            return Err(JobError::give_up(message, "raise MAREY_MAX_INPUT_BYTES"));
-        }
-        let mut found = Vec::with_capacity(files.len());
-        for (done, file) in files.iter().enumerate() {
-            job.check()?;
-            job.progress(0.2 * done as f64 / files.len() as f64, format!("fetching {}", file.name));
-            let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
-            found.push((
-                file.name.clone(),
-                objects::read(&self.store, input, self.memory.max_object_bytes).await?,
-            ));
-        }
-        Ok(found)
-    }
-}
-
-/// An index and what there is to say about it.
-struct Built {
-    bytes: Bytes,
-    summary: Summary,
-}
-
-/// `summary.json`.
-#[derive(Debug, Serialize)]
-struct Summary {
-    num_poses: usize,
-    frame_rate_hz: f64,
+/// The index files of a database, or the one.
+#[derive(Debug, Clone)]
+struct Written {
+    /// the index file, or the list of them
+    stored: Stored,
+    /// of all index files, bytes
+    bytes: u64,
+    num_shards: usize,
     skeleton: String,
     num_joints: usize,
     num_dofs: usize,
-    clips: Vec<ClipSummary>,
-    warnings: Vec<String>,
 }
 
-#[derive(Debug, Serialize)]
-struct ClipSummary {
-    name: String,
-    subject: String,
-    action: String,
-    num_poses: usize,
+impl BuildHandler {
+    /// Writes one shard after the other; what is held at a time is one of them and a source.
+    async fn write(
+        &self,
+        job: &JobContext,
+        payload: &BuildMotionDatabase,
+        sources: &Sources,
+    ) -> Result<Written, JobError> {
+        if sources.clips.is_empty() {
+            let message =
+                "no motion database can be built: no clip of at least 8 frames at 60 frames a second is left";
+            return Err(JobError::give_up(message, ""));
+        }
+        let sizes: Vec<usize> = sources.clips.iter().map(|listed| listed.clip.num_poses).collect();
+        let shard_of = shards::assign(&sizes, payload.shards);
+        let num_shards = shard_of.iter().max().map_or(1, |last| last + 1);
+        let mut stored = Vec::with_capacity(num_shards);
+        let mut last = None;
+        for shard in 0..num_shards {
+            let database = self.gather(job, payload, sources, &shard_of, (shard, num_shards)).await?;
+            let (skeleton, num_dofs) = (database.skeleton().clone(), database.num_dofs());
+            job.progress((shard as f64 + 0.9) / num_shards as f64, "writing the index");
+            let bytes = compute::run(move || database.to_bytes()).await;
+            let name = if num_shards == 1 { INDEX.to_owned() } else { format!("{shard:03}.mdb") };
+            stored.push(self.put(job, payload, &name, bytes).await?);
+            last = Some((skeleton, num_dofs));
+        }
+        let Some((skeleton, num_dofs)) = last else { return Err(JobError::retry("no shard was written")) };
+        let bytes = stored.iter().map(|s| s.bytes).sum();
+        let stored = match <[Stored; 1]>::try_from(stored) {
+            Ok([only]) => only,
+            Err(several) => {
+                let list =
+                    serde_json::to_vec(&list(sources, &shard_of, &several)).map_err(JobError::retry)?;
+                self.put(job, payload, SHARDS, list).await?
+            }
+        };
+        let (skeleton, num_joints) = (skeleton.name().to_owned(), skeleton.num_joints());
+        Ok(Written { stored, bytes, num_shards, skeleton, num_joints, num_dofs })
+    }
+
+    /// The clips of shard `shard` of so many, from all sources.
+    async fn gather(
+        &self,
+        job: &JobContext,
+        payload: &BuildMotionDatabase,
+        sources: &Sources,
+        shard_of: &[usize],
+        (shard, num_shards): (usize, usize),
+    ) -> Result<MotionDatabase, JobError> {
+        let wanted: Vec<_> =
+            sources.clips.iter().zip(shard_of).filter(|(_, s)| **s == shard).map(|(c, _)| c).collect();
+        let num_poses: usize = wanted.iter().map(|listed| listed.clip.num_poses).sum();
+        let mut gathered: Option<MotionDatabase> = None;
+        for of_source in wanted.chunk_by(|a, b| a.source == b.source) {
+            job.check()?;
+            let source = of_source[0].source;
+            let done = (shard as f64 + 0.8 * source as f64 / sources.files.len() as f64) / num_shards as f64;
+            job.progress(done, format!("putting {} clips together", sources.clips.len()));
+            let part = sources.open(source, &self.store, payload, self.memory.max_build_bytes).await?;
+            let mut database = match gathered.take() {
+                Some(database) => database,
+                None => {
+                    self.check_memory(num_poses, part.num_dofs(), payload)?;
+                    part.emptied()
+                }
+            };
+            let clips: Vec<(usize, String)> =
+                of_source.iter().map(|listed| (listed.index, listed.clip.name.clone())).collect();
+            let appended = compute::run(move || {
+                for (index, name) in clips {
+                    database.append_from(&part, index, &name)?;
+                }
+                Ok(database)
+            });
+            gathered = Some(appended.await.map_err(|e: motion_db::Error| no_database(&e))?);
+        }
+        gathered.ok_or_else(|| JobError::retry("a shard without clips"))
+    }
+
+    /// Poses and the index file made of them are in memory together.
+    fn check_memory(
+        &self,
+        num_poses: usize,
+        num_dofs: usize,
+        payload: &BuildMotionDatabase,
+    ) -> Result<(), JobError> {
+        let needed = (2 * num_poses * num_dofs * size_of::<f32>()) as u64;
+        let limit = self.memory.max_build_bytes;
+        if needed <= limit {
+            return Ok(());
+        }
+        let message = format!(
+            "an index file of {num_poses} poses takes {needed} bytes of memory while it is built, expected at most \
+             {limit}; build {} shards or more (now {})",
+            payload.shards as u64 * needed.div_ceil(limit.max(1)) + 1,
+            payload.shards
+        );
+        Err(JobError::give_up(message, "or raise MAREY_MAX_BUILD_BYTES"))
+    }
+
+    async fn put(
+        &self,
+        job: &JobContext,
+        payload: &BuildMotionDatabase,
+        name: &str,
+        bytes: Vec<u8>,
+    ) -> Result<Stored, JobError> {
+        let id = payload.motion_database.id;
+        let key =
+            key::motion_database(id, job.id().0, job.lease_number().0, name).map_err(JobError::retry)?;
+        self.store.put(&key, bytes.into()).await.map_err(JobError::retry)
+    }
 }
 
-fn build(files: Vec<(String, Bytes)>, limits: inputs::Limits, job: &JobContext) -> Result<Built, JobError> {
-    let read = inputs::clips(files, limits, &|| job.is_cancelled())?;
-    job.check()?;
-    job.progress(0.6, format!("indexing {} clips", read.clips.len()));
-    let database = MotionDatabase::build(&read.clips)
-        .map_err(|e| JobError::give_up(format!("no motion database can be built: {e}"), format!("{e:?}")))?;
-    job.check()?;
-    let clip = |c: &motion_db::ClipInfo| ClipSummary {
-        name: c.name.clone(),
-        subject: c.subject.clone(),
-        action: c.action.clone(),
-        num_poses: c.num_poses,
+fn list(sources: &Sources, shard_of: &[usize], stored: &[Stored]) -> ShardList {
+    let clip = |(listed, shard): (&crate::sources::Listed, &usize)| {
+        let Clip { name, subject, action, num_poses } = listed.clip.clone();
+        ShardedClip { name, subject, action, num_poses, shard: *shard }
     };
-    let summary = Summary {
-        num_poses: database.num_poses(),
-        frame_rate_hz: motion_db::FRAME_RATE,
-        skeleton: database.skeleton().name().to_owned(),
-        num_joints: database.skeleton().num_joints(),
-        num_dofs: database.num_dofs(),
-        clips: database.clips().iter().map(clip).collect(),
-        warnings: read.warnings,
-    };
-    Ok(Built { bytes: database.to_bytes().into(), summary })
+    let shard = |s: &Stored| Shard { store_key: s.key.to_string(), bytes: s.bytes, blake3: s.blake3.clone() };
+    ShardList {
+        shards: stored.iter().map(shard).collect(),
+        clips: sources.clips.iter().zip(shard_of).map(clip).collect(),
+    }
 }
 
 /// What makes a row of `motion_databases` ready.
 #[derive(Debug, Clone)]
 struct Ready {
     id: Uuid,
-    stored: Stored,
+    written: Written,
     num_poses: usize,
-    num_clips: usize,
-    skeleton: String,
+    contents: Contents,
+    clips: Vec<Clip>,
+}
+
+/// `summary.json`.
+#[derive(Serialize)]
+struct Summary<'a> {
+    num_poses: usize,
+    skeleton: &'a str,
+    num_shards: usize,
+    #[serde(flatten)]
+    contents: &'a Contents,
+    clips: &'a [Clip],
+}
+
+impl<'a> Summary<'a> {
+    fn of(ready: &'a Ready) -> Self {
+        Self {
+            num_poses: ready.num_poses,
+            skeleton: &ready.written.skeleton,
+            num_shards: ready.written.num_shards,
+            contents: &ready.contents,
+            clips: &ready.clips,
+        }
+    }
 }
 
 async fn set_ready(connection: &mut PgConnection, ready: &Ready) -> Result<(), JobError> {
     let number = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
     let sql = "UPDATE motion_databases
-               SET store_key = $2, bytes = $3, blake3 = $4, num_poses = $5, num_clips = $6, skeleton = $7,
-                   ready_at = clock_timestamp()
+               SET store_key = $2, bytes = $3, blake3 = $4, num_poses = $5, num_clips = $6, num_shards = $7,
+                   skeleton = $8, contents = $9, clips = $10, ready_at = clock_timestamp()
                WHERE id = $1 AND store_key IS NULL";
+    let Written { stored, bytes, num_shards, skeleton, .. } = &ready.written;
     let updated = sqlx::query(sql)
         .bind(ready.id)
-        .bind(ready.stored.key.as_str())
-        .bind(i64::try_from(ready.stored.bytes).unwrap_or(i64::MAX))
-        .bind(&ready.stored.blake3)
+        .bind(stored.key.as_str())
+        .bind(i64::try_from(*bytes).unwrap_or(i64::MAX))
+        .bind(&stored.blake3)
         .bind(number(ready.num_poses))
-        .bind(number(ready.num_clips))
-        .bind(&ready.skeleton)
+        .bind(number(ready.clips.len()))
+        .bind(i32::try_from(*num_shards).unwrap_or(i32::MAX))
+        .bind(skeleton)
+        .bind(Json(&ready.contents))
+        .bind(Json(&ready.clips))
         .execute(connection)
         .await?
         .rows_affected();

@@ -3,7 +3,6 @@
 use crate::Error;
 use chrono::{DateTime, Utc};
 use sqlx::PgPool;
-use store::Key;
 use uuid::Uuid;
 
 /// A motion database that can be asked.
@@ -17,13 +16,8 @@ pub(crate) struct Row {
     pub blake3: String,
     pub num_poses: i64,
     pub num_clips: i64,
+    pub num_shards: Option<i32>,
     pub ready_at: DateTime<Utc>,
-}
-
-impl Row {
-    pub fn key(&self) -> Result<Key, Error> {
-        Ok(self.store_key.parse()?)
-    }
 }
 
 /// Databases of a project, newest first, at most `count`, after the one with id `after`.
@@ -34,7 +28,7 @@ pub(crate) async fn list(
     count: i64,
 ) -> Result<Vec<Row>, Error> {
     // Ids are in the order of creation.
-    let sql = "SELECT id, name, version, store_key, bytes, blake3, num_poses, num_clips, ready_at
+    let sql = "SELECT id, name, version, store_key, bytes, blake3, num_poses, num_clips, num_shards, ready_at
                FROM motion_databases
                WHERE project_id = $1 AND store_key IS NOT NULL AND ($2 IS NULL OR id < $2)
                ORDER BY id DESC LIMIT $3";
@@ -43,7 +37,7 @@ pub(crate) async fn list(
 
 /// One database.
 pub(crate) async fn find(pool: &PgPool, id: Uuid) -> Result<Row, Error> {
-    let sql = "SELECT id, name, version, store_key, bytes, blake3, num_poses, num_clips, ready_at
+    let sql = "SELECT id, name, version, store_key, bytes, blake3, num_poses, num_clips, num_shards, ready_at
                FROM motion_databases WHERE id = $1 AND store_key IS NOT NULL";
     match sqlx::query_as(sql).bind(id).fetch_optional(pool).await? {
         Some(row) => Ok(row),

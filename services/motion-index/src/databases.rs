@@ -2,7 +2,11 @@
 
 use crate::{Error, catalogue, catalogue::Row, search};
 use motion_db::{MotionDatabase, WindowIndex};
-use service::{Cache, compute, config::MemoryConfig};
+use service::{
+    Cache, compute,
+    config::MemoryConfig,
+    motion_database::{self, Index, ShardList},
+};
 use sqlx::PgPool;
 use std::sync::Arc;
 use store::Store;
@@ -15,14 +19,22 @@ const DATABASE_SHARE: f64 = 0.25;
 pub(crate) struct Databases {
     pool: PgPool,
     store: Store,
-    databases: Cache<Uuid, MotionDatabase>,
+    lists: Cache<Uuid, Option<ShardList>>,
+    databases: Cache<Part, MotionDatabase>,
     derived: Cache<DerivedKey, Derived>,
+}
+
+/// A file that can be searched by itself: an undivided database, or a shard of one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Part {
+    pub database: Uuid,
+    pub shard: Option<usize>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum DerivedKey {
-    Windows { database: Uuid, window: usize },
-    Points { database: Uuid, names: Vec<String> },
+    Windows { part: Part, window: usize },
+    Points { part: Part, names: Vec<String> },
 }
 
 #[derive(Debug)]
@@ -37,6 +49,8 @@ impl Databases {
         Self {
             pool,
             store,
+            // Lists are small beside what they list.
+            lists: Cache::new(databases / 8),
             databases: Cache::new(databases),
             derived: Cache::new(memory.database_cache_bytes - databases),
         }
@@ -46,30 +60,61 @@ impl Databases {
         &self.pool
     }
 
-    /// The row and the database itself.
-    pub async fn get(&self, id: Uuid) -> Result<(Row, Arc<MotionDatabase>), Error> {
+    /// The row of a database, and the list of its shards if it has several.
+    pub async fn find(&self, id: Uuid) -> Result<(Row, Arc<Option<ShardList>>), Error> {
         let row = catalogue::find(&self.pool, id).await?;
+        if row.num_shards.unwrap_or(1) == 1 {
+            return Ok((row, Arc::new(None)));
+        }
+        let load = async {
+            let limit = self.databases.capacity_bytes();
+            let list = match motion_database::read(&self.store, &row.store_key, &row.blake3, limit).await? {
+                Index::Whole(_) => None,
+                Index::Sharded(list) => Some(list),
+            };
+            let clips = list.as_ref().map_or(0, |list| list.clips.len());
+            Ok::<_, Error>((list, 256 * clips as u64))
+        };
+        let list = self.lists.get_or_load(id, load).await?;
+        Ok((row, list))
+    }
+
+    /// An index file, opened. `row` and `list` are the database's.
+    pub async fn open(
+        &self,
+        row: &Row,
+        list: &Option<ShardList>,
+        shard: Option<usize>,
+    ) -> Result<Arc<MotionDatabase>, Error> {
         let limit = self.databases.capacity_bytes();
         let load = async {
-            let bytes = self.store.get_checked(&row.key()?, &row.blake3, limit).await?;
-            let database = compute::run(move || MotionDatabase::from_bytes(&bytes)).await?;
+            let database = match (list, shard) {
+                (None, _) => motion_database::open(&self.store, &row.store_key, &row.blake3, limit).await?,
+                (Some(list), Some(shard)) if shard < list.shards.len() => {
+                    list.shards[shard].open(&self.store, limit).await?
+                }
+                (Some(list), _) => {
+                    let found = shard.map_or("none".to_owned(), |shard| shard.to_string());
+                    return Err(Error::NoSuchShard { found, num_shards: list.shards.len() });
+                }
+            };
             let size = (database.num_poses() * database.num_dofs() * size_of::<f32>()) as u64;
-            tracing::info!(database.id = %id, num_poses = database.num_poses(), "motion database loaded");
+            tracing::info!(database.id = %row.id, shard, num_poses = database.num_poses(), "motion database loaded");
             Ok::<_, Error>((database, size))
         };
-        let database = self.databases.get_or_load(id, load).await?;
-        Ok((row, database))
+        let part = Part { database: row.id, shard: shard.filter(|_| list.is_some()) };
+        self.databases.get_or_load(part, load).await
     }
 
     /// The windows nearest to a question, by [`search::nearest_windows`].
     pub async fn nearest_windows(
         &self,
-        id: Uuid,
+        part: Part,
+        database: Arc<MotionDatabase>,
         question: search::WindowQuestion,
     ) -> Result<Vec<search::Match>, Error> {
-        let (_, database) = self.get(id).await?;
-        let key = DerivedKey::Windows { database: id, window: question.num_frames() };
         let window = question.num_frames();
+        let key = DerivedKey::Windows { part, window };
         let derived = self.derived(key, search::window_bytes(&database, window), "the index of windows", {
             let database = database.clone();
             move || Ok(Derived::Windows(WindowIndex::new(&database, window)?))
@@ -85,12 +130,12 @@ impl Databases {
     /// The poses that fit control points best, by [`search::nearest_poses`].
     pub async fn nearest_poses(
         &self,
-        id: Uuid,
+        part: Part,
+        database: Arc<MotionDatabase>,
         question: search::PointQuestion,
     ) -> Result<Vec<search::Match>, Error> {
-        let (_, database) = self.get(id).await?;
         let names = question.names().to_vec();
-        let key = DerivedKey::Points { database: id, names: names.clone() };
+        let key = DerivedKey::Points { part, names: names.clone() };
         let derived =
             self.derived(key, search::table_bytes(&database, names.len()), "the table of points", {
                 let database = database.clone();

@@ -38,9 +38,20 @@ pub enum Error {
         /// Bytes there are.
         limit_bytes: u64,
     },
+    /// There is no such shard.
+    #[error("shard is {found}, the motion database has {num_shards}")]
+    NoSuchShard {
+        /// What was asked for.
+        found: String,
+        /// How many shards there are.
+        num_shards: usize,
+    },
     /// The object store failed, or does not hold what the catalogue says.
     #[error(transparent)]
-    Store(#[from] store::Error),
+    File(#[from] service::motion_database::Error),
+    /// Another replica refused its part of the question.
+    #[error("{}", .0.message())]
+    Peer(Box<tonic::Status>),
     /// PostgreSQL failed.
     #[error("database: {0}")]
     Catalogue(#[from] sqlx::Error),
@@ -49,6 +60,7 @@ pub enum Error {
 impl Error {
     /// Which kind of error it is.
     pub fn code(&self) -> ErrorCode {
+        use service::motion_database::Error as File;
         match self {
             Self::Request(_) | Self::PageToken | Self::Kinematics(_) | Self::Model(_) => {
                 ErrorCode::InvalidInput
@@ -58,15 +70,23 @@ impl Error {
             Self::NoSuchDatabase(_) => ErrorCode::NotFound,
             Self::NotReady(_) => ErrorCode::NotReady,
             Self::TooLarge { .. } => ErrorCode::TooLarge,
-            Self::Store(error) if error.is_transient() => ErrorCode::Unavailable,
+            Self::NoSuchShard { .. } => ErrorCode::InvalidInput,
+            Self::File(File::Store(error)) if error.is_transient() => ErrorCode::Unavailable,
+            Self::File(File::Store(store::Error::TooLarge { .. })) => ErrorCode::TooLarge,
+            Self::File(File::Database(motion_db::Error::Version { .. })) => ErrorCode::NotReady,
             Self::Catalogue(_) => ErrorCode::Unavailable,
-            Self::Database(_) | Self::Store(_) => ErrorCode::Internal,
+            Self::Database(_) | Self::File(_) | Self::Peer(_) => ErrorCode::Internal,
         }
     }
 }
 
 impl From<Error> for tonic::Status {
     fn from(error: Error) -> Self {
+        // What another replica says of its shard is said of the whole.
+        let error = match error {
+            Error::Peer(status) => return *status,
+            error => error,
+        };
         let code = error.code();
         if matches!(code, ErrorCode::Internal | ErrorCode::Unavailable) {
             tracing::error!(%error, "query failed");

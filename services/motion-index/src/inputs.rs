@@ -1,4 +1,4 @@
-//! From uploaded files to clips.
+//! From uploaded files to motion files, and from these to clips.
 
 use bytes::Bytes;
 use formats::{
@@ -8,62 +8,110 @@ use formats::{
 use motion_db::Clip;
 use queue::JobError;
 
-/// How much may be unpacked.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Limits {
-    /// Bytes of all files together.
-    pub unpacked_bytes: u64,
+/// What an unpacked file is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Use {
+    /// A motion.
+    Motion,
+    /// Tells of motions: a skeleton, an `index.csv`.
+    Support,
+    /// Nothing.
+    None,
 }
 
-/// What was read.
-#[derive(Debug)]
-pub(crate) struct Clips {
-    /// The motions, in the order of their paths.
-    pub clips: Vec<Clip>,
-    /// What was sloppy, each with the file's name.
-    pub warnings: Vec<String>,
+impl Use {
+    /// By name; what systems hide in archives is of no use.
+    pub fn of(name: &str) -> Self {
+        let lower = name.to_ascii_lowercase();
+        let (folder, file) = lower.rsplit_once('/').unwrap_or(("", &lower));
+        if file.starts_with('.') || folder.split('/').any(|f| f.starts_with('.') || f == "__macosx") {
+            return Self::None;
+        }
+        match file.rsplit_once('.') {
+            Some((_, "amc" | "bvh")) => Self::Motion,
+            Some((_, "asf")) => Self::Support,
+            Some(("index", "csv")) => Self::Support,
+            _ => Self::None,
+        }
+    }
 }
 
-/// Unpacks and reads files: archives, ASF with AMC, BVH. `is_cancelled` is asked between files.
+/// Unpacks a file. Members of an archive lie in a folder with its name, so that those of two archives don't mix.
 ///
 /// # Errors
-/// Gives up on what can't be read, with the file and the place in it.
-pub(crate) fn clips(
-    files: Vec<(String, Bytes)>,
-    limits: Limits,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Clips, JobError> {
-    let mut entries = Vec::new();
-    let mut left = limits.unpacked_bytes;
-    for (name, bytes) in files {
-        if is_cancelled() {
-            return Err(JobError::Stopped);
-        }
-        let allowed = archive::Limits { total_bytes: left, ..archive::Limits::default() };
-        let unpacked =
-            archive::entries(&name, &bytes, &allowed).map_err(|e| give_up(&format!("{name}: {e}"), &e))?;
-        left = left.saturating_sub(unpacked.iter().map(|e| e.bytes.len() as u64).sum());
-        entries.extend(placed(&name, unpacked));
-    }
-    let options = motion_files::Options::default();
-    let read = motion_files::clips(&entries, &options).map_err(|e| give_up(&e.to_string(), &e))?;
-    let clip = |file: motion_files::MotionFile| Clip {
-        name: file.name,
-        subject: file.subject,
-        action: file.action,
-        motion: file.motion,
-    };
-    Ok(Clips {
-        clips: read.value.into_iter().map(clip).collect(),
-        warnings: read.warnings.into_iter().map(|w| w.message).collect(),
-    })
+/// Gives up on what can't be unpacked into `max_bytes`, and names it.
+pub(crate) fn unpack(name: &str, bytes: &Bytes, max_bytes: u64) -> Result<Vec<Entry>, JobError> {
+    let limits = archive::Limits { total_bytes: max_bytes, ..archive::Limits::default() };
+    let entries = archive::entries(name, bytes, &limits).map_err(|e| give_up(&format!("{name}: {e}"), &e))?;
+    Ok(placed(name, entries))
 }
 
-/// Members of an archive lie in a folder with its name, so that those of two archives don't mix.
-fn placed(file: &str, entries: Vec<Entry>) -> impl Iterator<Item = Entry> {
+fn placed(file: &str, mut entries: Vec<Entry>) -> Vec<Entry> {
     let is_single = entries.len() == 1 && entries.iter().all(|e| file.starts_with(&e.name));
-    let folder = if is_single { String::new() } else { format!("{file}/") };
-    entries.into_iter().map(move |e| Entry { name: format!("{folder}{}", e.name), bytes: e.bytes })
+    if !is_single {
+        entries.iter_mut().for_each(|entry| entry.name.insert_str(0, &format!("{file}/")));
+    }
+    entries
+}
+
+/// The files of an earlier job, as one archive.
+///
+/// # Errors
+/// Gives up on names that no archive holds.
+pub(crate) fn pack(entries: &[Entry]) -> Result<Vec<u8>, JobError> {
+    let mut builder = tar::Builder::new(Vec::new());
+    for entry in entries {
+        let mut header = tar::Header::new_gnu();
+        header.set_size(entry.bytes.len() as u64);
+        header.set_mode(0o644);
+        builder
+            .append_data(&mut header, &entry.name, entry.bytes.as_slice())
+            .map_err(|e| JobError::give_up(format!("{}: a file can't have this name", entry.name), e))?;
+    }
+    builder.into_inner().map_err(JobError::retry)
+}
+
+/// What [`pack`] packed.
+///
+/// # Errors
+/// Tries again, as the archive was made by us.
+pub(crate) fn unpack_packed(bytes: &[u8]) -> Result<Vec<Entry>, JobError> {
+    let limits =
+        archive::Limits { total_bytes: u64::MAX, entries: usize::MAX, name_bytes: usize::MAX, ratio: 1 };
+    archive::entries("parts.tar", bytes, &limits).map_err(JobError::retry)
+}
+
+/// Reads motion files one at a time, among the skeletons and indices that they may need.
+pub(crate) struct Reader {
+    entries: Vec<Entry>,
+    options: motion_files::Options,
+}
+
+impl Reader {
+    /// `support`: skeletons and indices.
+    pub fn new(support: Vec<Entry>, bvh_metres_per_unit: f64) -> Self {
+        let bvh = formats::BvhOptions { metres_per_unit: bvh_metres_per_unit };
+        Self { entries: support, options: motion_files::Options { bvh, ..motion_files::Options::default() } }
+    }
+
+    /// The clip of a motion file, and what was sloppy about it.
+    ///
+    /// # Errors
+    /// Gives up on what can't be read, with the file and the place in it.
+    pub fn clip(&mut self, motion: Entry) -> Result<(Option<Clip>, Vec<String>), JobError> {
+        self.entries.push(motion);
+        let read = motion_files::clips(&self.entries, &self.options);
+        self.entries.pop();
+        let read = read.map_err(|e| give_up(&e.to_string(), &e))?;
+        let clip = read.value.into_iter().next().map(|file| Clip {
+            // What is made of a clip is named after it with a `~` between.
+            name: file.name.replace('~', "-"),
+            subject: file.subject,
+            action: file.action,
+            motion: file.motion,
+        });
+        Ok((clip, read.warnings.into_iter().map(|w| w.message).collect()))
+    }
 }
 
 fn give_up(message: &str, error: &formats::Error) -> JobError {
@@ -74,12 +122,15 @@ fn give_up(message: &str, error: &formats::Error) -> JobError {
 mod tests {
     use super::*;
 
+    fn entry(name: &str, bytes: &[u8]) -> Entry {
+        Entry { name: name.to_owned(), bytes: bytes.to_vec() }
+    }
+
     #[test]
     fn members_lie_in_a_folder_with_the_name_of_their_archive() {
-        let entry = |name: &str| Entry { name: name.to_owned(), bytes: Vec::new() };
         let names = |file, names: &[&str]| {
-            let entries = names.iter().map(|n| entry(n)).collect();
-            placed(file, entries).map(|e| e.name).collect::<Vec<_>>()
+            let entries = names.iter().map(|n| entry(n, b"")).collect();
+            placed(file, entries).into_iter().map(|e| e.name).collect::<Vec<_>>()
         };
         assert_eq!(names("a.zip", &["16/16.asf", "x.bvh"]), ["a.zip/16/16.asf", "a.zip/x.bvh"]);
         assert_eq!(names("16.asf", &["16.asf"]), ["16.asf"]);
@@ -87,22 +138,41 @@ mod tests {
     }
 
     #[test]
+    fn files_are_told_apart_by_name() {
+        for (name, expected) in [
+            ("a.zip/16/16_15.AMC", Use::Motion),
+            ("x.bvh", Use::Motion),
+            ("16.asf", Use::Support),
+            ("a/INDEX.csv", Use::Support),
+            ("a/other.csv", Use::None),
+            ("__MACOSX/16_15.amc", Use::None),
+            ("a/._16_15.amc", Use::None),
+            ("a/.git/x.amc", Use::None),
+            ("amc", Use::None),
+            ("", Use::None),
+        ] {
+            assert_eq!(Use::of(name), expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn packed_files_come_back() {
+        let long = format!("{}16.asf", "long/".repeat(60));
+        let files = vec![entry("a.zip/16/16.asf", b"x"), entry(&long, b""), entry("ä b.amc", b"yz")];
+        assert_eq!(unpack_packed(&pack(&files).unwrap()).unwrap(), files);
+        assert!(unpack_packed(&pack(&[]).unwrap()).unwrap().is_empty());
+    }
+
+    #[test]
     fn a_file_that_cannot_be_read_is_named_with_the_line() {
-        let limits = Limits { unpacked_bytes: 1 << 20 };
-        let files =
-            vec![("walk.bvh".to_owned(), Bytes::from_static(b"HIERARCHY\nROOT hips\n{\n nonsense\n"))];
-        let error = clips(files, limits, &|| false).unwrap_err().to_string();
+        let broken = entry("walk.bvh", b"HIERARCHY\nROOT hips\n{\n nonsense\n");
+        let error = Reader::new(Vec::new(), 0.01).clip(broken).unwrap_err().to_string();
         assert!(error.contains("walk.bvh") && error.contains("line"), "{error}");
     }
 
     #[test]
     fn more_than_may_be_unpacked_is_refused() {
-        let limits = Limits { unpacked_bytes: 10 };
-        let packed = [
-            ("a.bvh".to_owned(), Bytes::from_static(b"HIERARCHY")),
-            ("b.bvh.gz".to_owned(), gzip(&[b' '; 100])),
-        ];
-        let error = clips(packed.to_vec(), limits, &|| false).unwrap_err().to_string();
+        let error = unpack("b.bvh.gz", &gzip(&[b' '; 100]), 10).unwrap_err().to_string();
         assert!(error.contains("b.bvh"), "{error}");
     }
 

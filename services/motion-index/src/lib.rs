@@ -1,32 +1,48 @@
 //! The motion-index service: builds motion databases from uploaded files and answers questions on them.
 //!
-//! [`start`] runs the gRPC server (`marey.v1.MotionIndex`, health, reflection) and claims jobs of kind
-//! [`BUILD_MOTION_DATABASE`]. Databases are read from the object store when they are first asked for and
-//! kept in memory up to a bound.
+//! [`start`] runs the gRPC server (`marey.v1.MotionIndex`, health, reflection) and claims four kinds of job:
+//!
+//! ```text
+//! plan-motion-database ──► import-motion × n ──► build-motion-database          train-gplvm
+//! ```
+//!
+//! The plan unpacks what people uploaded and divides it into parts; imports read, smooth and augment one part each; the
+//! build puts them together, after the clips of an earlier version if it is one to be added to, and writes the index
+//! file or files. How the files are divided does not show in the result. Databases are read from the object store when
+//! they are first asked for and kept in memory up to a bound; the shards of large ones are kept by several replicas.
 
 mod build_job;
 mod catalogue;
+mod contents;
 mod databases;
 mod error;
+mod fan_out;
+mod import_job;
 mod inputs;
 mod payload;
+mod peers;
+mod plan_job;
 mod rpc;
 mod search;
+mod shards;
+mod sources;
+mod train_job;
 
 pub use error::Error;
-pub use payload::{BuildMotionDatabase, InputFile, MotionDatabaseName};
 
-use build_job::BuildHandler;
 use databases::Databases;
+use fan_out::FanOut;
+use peers::Peers;
 use proto::v1::motion_index_server::MotionIndexServer;
 use service::{Config, Parts, Running};
 use std::net::SocketAddr;
-use std::sync::Arc;
 use store::Store;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 
-/// The kind of job this service claims.
+/// Reads the motion files of one part of a database.
+pub const IMPORT_MOTION: &str = "import-motion";
+/// Puts the parts of a database together.
 pub const BUILD_MOTION_DATABASE: &str = "build-motion-database";
 
 /// Name of the service in logs and in the queue.
@@ -44,10 +60,21 @@ pub const DEFAULT_LISTEN: SocketAddr =
 pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Running, service::Error> {
     let pool = service::database::pool(&config.database)?;
     let store = Store::open(&config.store)?;
-    let databases = Arc::new(Databases::new(pool.clone(), store.clone(), &config.memory));
-    let routes = Routes::new(MotionIndexServer::new(rpc::Rpc::new(databases)));
-    let builder = config.worker.builder(NAME, &pool);
-    let builder = builder.map(|b| b.handler(BuildHandler::new(store, config.memory.clone())));
+    let peers = Peers::new(&config.peers).map_err(|error| service::Error::BadValue {
+        name: "MAREY_MOTION_INDEX_PEERS",
+        found: error.found,
+        expected: format!("addresses such as http://10.0.0.7:50051: {}", error.reason),
+    })?;
+    let databases = Databases::new(pool.clone(), store.clone(), &config.memory);
+    let routes = Routes::new(MotionIndexServer::new(rpc::Rpc::new(FanOut { databases, peers })));
+    let memory = &config.memory;
+    let builder = config.worker.builder(NAME, &pool).map(|builder| {
+        builder
+            .handler(plan_job::PlanHandler::new(store.clone(), memory.clone()))
+            .handler(import_job::ImportHandler::new(store.clone()))
+            .handler(build_job::BuildHandler::new(store.clone(), pool.clone(), memory.clone()))
+            .handler(train_job::TrainHandler::new(store, memory.clone()))
+    });
     let parts = Parts {
         name: NAME,
         grpc_names: &["marey.v1.MotionIndex"],

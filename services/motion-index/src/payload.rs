@@ -1,40 +1,58 @@
-//! What the job of this service is given.
+//! What the jobs of one build give each other.
 
+use payloads::{Augment, MotionDatabaseFile, MotionDatabaseName, Object};
 use serde::{Deserialize, Serialize};
-use uuid::Uuid;
 
-/// Payload of [`crate::BUILD_MOTION_DATABASE`].
+/// Payload of [`crate::IMPORT_MOTION`], made by the plan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BuildMotionDatabase {
+pub(crate) struct ImportMotion {
+    /// A small database whose coordinates all parts have.
+    pub basis: Object,
+    /// Archive of the skeletons and indices of all files.
+    pub skeletons: Object,
+    /// Archive of the motion files of this part.
+    pub motions: Object,
+    /// What is made from every clip.
+    pub augment: Augment,
+    /// Metres of one unit of BVH files.
+    pub bvh_metres_per_unit: f64,
+}
+
+/// Payload of [`crate::BUILD_MOTION_DATABASE`], made by the plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct BuildMotionDatabase {
     /// The database to build.
     pub motion_database: MotionDatabaseName,
-    /// What it is built from, in order of name.
-    pub files: Vec<InputFile>,
+    /// The database whose clips it begins with.
+    pub base: Option<MotionDatabaseFile>,
+    /// Names of clips of `base` that are left out.
+    pub without: Vec<String>,
+    /// What was made from every clip.
+    pub augment: Augment,
+    /// Into how many index files it is divided.
+    pub shards: usize,
 }
 
-/// A motion database by id, name and version.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MotionDatabaseName {
-    /// The row in `motion_databases`.
-    pub id: Uuid,
-    /// Name in its project.
-    pub name: String,
-    /// Version of that name, from 1.
-    pub version: i32,
+/// What a part holds, beside the part itself.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct PartReport {
+    /// The clips, in the order of the part.
+    pub clips: Vec<PartClip>,
+    /// What was sloppy, each with the file's name.
+    pub warnings: Vec<String>,
 }
 
-/// An uploaded file.
+/// A clip of a part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct InputFile {
-    /// Name given by the user.
+pub(crate) struct PartClip {
+    /// Which motion file of the part it was made from.
+    pub file: usize,
+    /// Its name; files in different folders may have the same.
     pub name: String,
-    /// `motion` or `skeleton`; both are read alike.
-    #[serde(default)]
-    pub role: String,
-    /// Where it is in the object store.
-    pub store_key: String,
-    /// Size, bytes.
-    pub bytes: u64,
-    /// BLAKE3 of the content, hex.
-    pub blake3: String,
+    /// Who moved.
+    pub subject: String,
+    /// What they did; empty if unknown.
+    pub action: String,
+    /// Number of poses at 60 a second.
+    pub num_poses: usize,
 }

@@ -1,14 +1,10 @@
 //! `marey.v1.MotionIndex`: wire to question, answer to wire.
 
-use crate::{
-    Error, catalogue,
-    catalogue::Row,
-    databases::Databases,
-    search::{Match, PointQuestion, WindowQuestion},
-};
+use crate::{Error, catalogue, catalogue::Row, fan_out::FanOut, search::Match};
 use futures::{Stream, StreamExt};
-use motion_db::{FRAME_RATE, MotionDatabase};
+use motion_db::{ClipInfo, FRAME_RATE, MotionDatabase};
 use proto::v1::{self, motion_index_server::MotionIndex};
+use service::motion_database::{ShardList, ShardedClip};
 use std::{pin::Pin, sync::Arc};
 use tonic::{Request, Response, Status, Streaming};
 
@@ -16,12 +12,12 @@ const MAX_MATCHES: u32 = 1024;
 const PAGE_SIZE: u32 = 100;
 
 pub(crate) struct Rpc {
-    databases: Arc<Databases>,
+    fan_out: Arc<FanOut>,
 }
 
 impl Rpc {
-    pub fn new(databases: Arc<Databases>) -> Self {
-        Self { databases }
+    pub fn new(fan_out: FanOut) -> Self {
+        Self { fan_out: Arc::new(fan_out) }
     }
 }
 
@@ -38,7 +34,8 @@ impl MotionIndex for Rpc {
             token => Some(token.parse().map_err(|_| Error::PageToken)?),
         };
         let size = if request.page_size == 0 { PAGE_SIZE } else { request.page_size.min(PAGE_SIZE) };
-        let mut rows = catalogue::list(self.databases.pool(), project, after, i64::from(size) + 1).await?;
+        let mut rows =
+            catalogue::list(self.fan_out.databases.pool(), project, after, i64::from(size) + 1).await?;
         let is_more = rows.len() > size as usize;
         rows.truncate(size as usize);
         let next_page_token = rows.last().filter(|_| is_more).map(|r| r.id.to_string()).unwrap_or_default();
@@ -53,15 +50,18 @@ impl MotionIndex for Rpc {
         request: Request<v1::DescribeDatabaseRequest>,
     ) -> Result<Response<v1::DescribeDatabaseResponse>, Status> {
         let id = proto::id("database_id", &request.into_inner().database_id)?;
-        let (row, database) = self.databases.get(id).await?;
-        Ok(Response::new(describe(&row, &database)))
+        let databases = &self.fan_out.databases;
+        let (row, list) = databases.find(id).await?;
+        // All shards have the same skeleton.
+        let database = databases.open(&row, &list, list.is_some().then_some(0)).await?;
+        Ok(Response::new(describe(&row, &list, &database)))
     }
 
     async fn nearest_windows(
         &self,
         request: Request<v1::NearestWindowsRequest>,
     ) -> Result<Response<v1::NearestWindowsResponse>, Status> {
-        Ok(Response::new(nearest_windows(&self.databases, request.into_inner()).await?))
+        Ok(Response::new(nearest_windows(&self.fan_out, &request.into_inner()).await?))
     }
 
     type StreamNearestWindowsStream =
@@ -71,10 +71,10 @@ impl MotionIndex for Rpc {
         &self,
         request: Request<Streaming<v1::NearestWindowsRequest>>,
     ) -> Result<Response<Self::StreamNearestWindowsStream>, Status> {
-        let databases = self.databases.clone();
+        let fan_out = self.fan_out.clone();
         let answers = request.into_inner().then(move |question| {
-            let databases = databases.clone();
-            async move { Ok(nearest_windows(&databases, question?).await?) }
+            let fan_out = fan_out.clone();
+            async move { Ok(nearest_windows(&fan_out, &question?).await?) }
         });
         Ok(Response::new(Box::pin(answers)))
     }
@@ -84,14 +84,13 @@ impl MotionIndex for Rpc {
         request: Request<v1::FindPosesByControlPointsRequest>,
     ) -> Result<Response<v1::FindPosesByControlPointsResponse>, Status> {
         let request = request.into_inner();
-        let id = proto::id("database_id", &request.database_id)?;
-        let num_matches = num_matches(request.num_matches)?;
-        let frame = request.control_points.ok_or(proto::Error::Missing { field: "control_points" })?;
-        if frame.samples.len() < 2 {
-            return Err(out_of_range("control_points", frame.samples.len(), "at least two samples").into());
+        check_num_matches(request.num_matches)?;
+        let samples = request.control_points.as_ref().map(|frame| frame.samples.len());
+        let samples = samples.ok_or(proto::Error::Missing { field: "control_points" })?;
+        if samples < 2 {
+            return Err(out_of_range("control_points", samples, "at least two samples").into());
         }
-        let points = proto::points::trajectories(&[frame], FRAME_RATE)?;
-        let found = self.databases.nearest_poses(id, PointQuestion::new(points, num_matches)).await?;
+        let found = self.fan_out.find_poses(&request).await?;
         let matches = found
             .into_iter()
             .map(|m| v1::ControlPointMatch { residual_m: m.distance, pose: Some(pose(m)) })
@@ -101,26 +100,22 @@ impl MotionIndex for Rpc {
 }
 
 async fn nearest_windows(
-    databases: &Databases,
-    request: v1::NearestWindowsRequest,
+    fan_out: &FanOut,
+    request: &v1::NearestWindowsRequest,
 ) -> Result<v1::NearestWindowsResponse, Error> {
-    let id = proto::id("database_id", &request.database_id)?;
-    let num_matches = num_matches(request.num_matches)?;
+    check_num_matches(request.num_matches)?;
     if request.window.is_empty() {
         return Err(proto::Error::Missing { field: "window" }.into());
     }
-    let (_, database) = databases.get(id).await?;
-    let values = proto::poses::window(&request.window, database.num_dofs())?;
-    let question = WindowQuestion::new(values, database.num_dofs(), num_matches);
-    let found = databases.nearest_windows(id, question).await?;
+    let found = fan_out.nearest_windows(request).await?;
     let matches =
         found.into_iter().map(|m| v1::WindowMatch { distance: m.distance, pose: Some(pose(m)) }).collect();
     Ok(v1::NearestWindowsResponse { matches })
 }
 
-fn num_matches(found: u32) -> Result<usize, proto::Error> {
+fn check_num_matches(found: u32) -> Result<(), proto::Error> {
     if (1..=MAX_MATCHES).contains(&found) {
-        Ok(found as usize)
+        Ok(())
     } else {
         Err(out_of_range("num_matches", found, "1 to 1024"))
     }
@@ -144,15 +139,22 @@ fn summary(row: &Row) -> v1::DatabaseSummary {
         bytes: row.bytes.unsigned_abs(),
         blake3: row.blake3.clone(),
         ready_at_unix_millis: row.ready_at.timestamp_millis(),
+        num_shards: row.num_shards.unwrap_or(1).unsigned_abs(),
     }
 }
 
-fn describe(row: &Row, database: &MotionDatabase) -> v1::DescribeDatabaseResponse {
-    let clip = |c: &motion_db::ClipInfo| v1::DatabaseClip {
-        name: c.name.clone(),
-        subject: c.subject.clone(),
-        action: c.action.clone(),
-        num_frames: c.num_poses as u64,
+fn describe(row: &Row, list: &Option<ShardList>, database: &MotionDatabase) -> v1::DescribeDatabaseResponse {
+    let clip = |name: &String, subject: &String, action: &String, num_poses: usize| v1::DatabaseClip {
+        name: name.clone(),
+        subject: subject.clone(),
+        action: action.clone(),
+        num_frames: num_poses as u64,
+    };
+    let whole = |c: &ClipInfo| clip(&c.name, &c.subject, &c.action, c.num_poses);
+    let sharded = |c: &ShardedClip| clip(&c.name, &c.subject, &c.action, c.num_poses);
+    let clips = match list {
+        None => database.clips().iter().map(whole).collect(),
+        Some(list) => list.clips.iter().map(sharded).collect(),
     };
     let skeleton = database.skeleton();
     v1::DescribeDatabaseResponse {
@@ -161,6 +163,6 @@ fn describe(row: &Row, database: &MotionDatabase) -> v1::DescribeDatabaseRespons
         skeleton_name: skeleton.name().to_owned(),
         joint_names: skeleton.joints().iter().map(|j| j.name.clone()).collect(),
         dof_names: skeleton.dof_names(),
-        clips: database.clips().iter().map(clip).collect(),
+        clips,
     }
 }

@@ -1,4 +1,7 @@
-//! The two searches, as plain functions on a database.
+//! The two searches, as plain functions on an index file.
+//!
+//! Distances depend on the poses and the question alone: what an index rounds, or finds in another order, because it
+//! holds other clips beside, does not show. So the shards of a database answer as the whole does.
 
 use crate::Error;
 use kinematics::PointSet;
@@ -18,6 +21,14 @@ pub(crate) struct Match {
     pub frame: usize,
     /// Of windows: (degrees, centimetres). Of poses: root mean square, metres.
     pub distance: f64,
+}
+
+impl Match {
+    /// A match that another replica found.
+    pub fn from_wire(pose: Option<proto::v1::DatabasePose>, distance: f64) -> Self {
+        let pose = pose.unwrap_or_default();
+        Self { clip: pose.clip, frame: pose.frame as usize, distance }
+    }
 }
 
 /// Which windows are like this one?
@@ -83,6 +94,15 @@ pub(crate) fn table_bytes(database: &MotionDatabase, points: usize) -> u64 {
     (database.num_poses() * points * 2 * 3 * size_of::<f32>()) as u64
 }
 
+/// Matches that are sought beyond those asked for: windows whose distances are so alike that the rounding of an index
+/// may have exchanged them.
+const MARGIN: usize = 16;
+
+/// Whether no clip of the database has a window of `frames` frames and a pose after it.
+pub(crate) fn is_too_short(database: &MotionDatabase, frames: usize) -> bool {
+    database.clips().iter().all(|clip| clip.num_poses <= frames)
+}
+
 /// The windows nearest to the question, nearest first; a match is the newest pose of its window.
 ///
 /// # Errors
@@ -97,13 +117,39 @@ pub(crate) fn nearest_windows(
     let mut scratch = vec![0.0; index.width()];
     let mut features = vec![0.0; index.width()];
     index.query_features(&newest_first, &mut scratch, &mut features);
-    let features: Vec<f32> = features.iter().map(|v| *v as f32).collect();
-    let query = Query { features: &features, controls: None, exclude: &[], hints: &[] };
+    let rotated: Vec<f32> = features.iter().map(|v| *v as f32).collect();
+    let query = Query { features: &rotated, controls: None, exclude: &[], hints: &[] };
     let mut found = Vec::new();
-    index.nearest(&query, question.num_matches, &mut Scratch::default(), &mut found);
-    let to_match =
-        |n: &motion_db::Neighbour| at(database, index.target(n.row) - 1, n.distance_squared.sqrt());
-    Ok(found.iter().map(to_match).collect())
+    index.nearest(&query, question.num_matches + MARGIN, &mut Scratch::default(), &mut found);
+    index.scale().window_features(&newest_first, &mut features);
+    let mut exact: Vec<(f64, usize)> = found
+        .iter()
+        .map(|n| {
+            let newest = index.target(n.row) - 1;
+            (distance(database, index, newest, &features, &mut scratch), newest)
+        })
+        .collect();
+    exact.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    exact.truncate(question.num_matches);
+    Ok(exact.into_iter().map(|(distance, newest)| at(database, newest, distance)).collect())
+}
+
+/// Distance of the window that ends with pose `newest` from one of these features, (degrees, centimetres).
+fn distance(
+    database: &MotionDatabase,
+    index: &WindowIndex,
+    newest: usize,
+    features: &[f64],
+    scratch: &mut [f64],
+) -> f64 {
+    let dofs = database.num_dofs();
+    let mut poses = vec![0.0; index.window() * dofs];
+    for (i, pose) in poses.chunks_exact_mut(dofs).enumerate() {
+        database.copy_pose(newest - i, pose);
+    }
+    let newest_first: Vec<&[f64]> = poses.chunks_exact(dofs).collect();
+    index.scale().window_features(&newest_first, scratch);
+    scratch.iter().zip(features).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The poses whose control points fit best, best first.

@@ -2,6 +2,7 @@
 
 use formats::{BvhOptions, PointsOptions};
 use model::Axis;
+pub use payloads::{InputFile, MotionDatabaseFile, Object};
 use serde::{Deserialize, Serialize};
 use sparse::Parameters;
 use std::collections::BTreeMap;
@@ -56,45 +57,6 @@ pub(crate) struct Reading {
     pub points: PointsOptions,
     /// Of BVH files.
     pub bvh: BvhOptions,
-}
-
-/// An uploaded file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct InputFile {
-    /// Name given by the user.
-    pub name: String,
-    /// `skeleton`, `control-points` or `ground-truth`.
-    pub role: String,
-    /// Where it is in the object store.
-    pub store_key: String,
-    /// Size, bytes.
-    pub bytes: u64,
-    /// BLAKE3 of the content, hex.
-    pub blake3: String,
-}
-
-/// A motion database that is ready.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct MotionDatabaseFile {
-    /// The row in `motion_databases`.
-    pub id: Uuid,
-    /// Name in its project.
-    pub name: String,
-    /// Version of that name, from 1.
-    pub version: i32,
-    /// Where its index file is in the object store.
-    pub store_key: String,
-    /// BLAKE3 of the index file, hex.
-    pub blake3: String,
-}
-
-/// An artefact of an earlier job.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Object {
-    /// Where it is in the object store.
-    pub store_key: String,
-    /// BLAKE3 of the content, hex.
-    pub blake3: String,
 }
 
 /// Payload of [`crate::RECONSTRUCT_CHUNK`], made by the plan.

@@ -3,7 +3,7 @@
 use crate::payload::MotionDatabaseFile;
 use motion_db::{MotionDatabase, WindowIndex};
 use queue::JobError;
-use service::{Cache, compute, config::MemoryConfig, objects};
+use service::{Cache, compute, config::MemoryConfig, motion_database};
 use std::sync::Arc;
 use store::Store;
 
@@ -41,13 +41,11 @@ impl Priors {
     /// # Errors
     /// Gives up if the file is gone, not a database, or too large for this service.
     pub async fn database(&self, file: &MotionDatabaseFile) -> Result<Arc<MotionDatabase>, JobError> {
-        let name = format!("motion database {} version {}", file.name, file.version);
+        let name = format!("{}@{}", file.name, file.version);
         let load = async {
-            let input = objects::Input { name: &name, store_key: &file.store_key, blake3: &file.blake3 };
-            let bytes = objects::read(&self.store, input, self.databases.capacity_bytes()).await?;
-            let database = compute::run(move || MotionDatabase::from_bytes(&bytes))
-                .await
-                .map_err(|e| JobError::give_up(format!("{name} can't be used: {e}"), format!("{e:?}")))?;
+            let limit = self.databases.capacity_bytes();
+            let database = motion_database::open(&self.store, &file.store_key, &file.blake3, limit).await;
+            let database = database.map_err(|error| error.of_job(&name))?;
             let bytes = (database.num_poses() * database.num_dofs() * size_of::<f32>()) as u64;
             tracing::info!(
                 database.name = file.name,

@@ -69,7 +69,7 @@ impl Shared {
         let row: Option<(Uuid, String, i32, String, String)> =
             sqlx::query_as(sql).bind(id).fetch_optional(&self.pool).await?;
         let (id, name, version, store_key, blake3) = row.ok_or(CallError::NoSuchDatabase(id))?;
-        Ok(MotionDatabaseFile { id, name, version, store_key, blake3 })
+        Ok(MotionDatabaseFile { id, name, version, store_key, blake3, gplvm: None })
     }
 }
 

@@ -104,6 +104,9 @@ impl Fixture {
             files,
             points: vec![],
             mapping: BTreeMap::new(),
+            marker_set: None,
+            marker_map: None,
+            marker_prefix: None,
             up: None,
             bvh_metres_per_unit: 0.01,
             parameters,
@@ -195,7 +198,10 @@ async fn index_walks(store: &Store, pool: &PgPool, project: Uuid) -> MotionDatab
         .collect();
     let database = MotionDatabase::build(&clips).unwrap();
     let id = Uuid::now_v7();
-    let stored = store.put(&key::motion_database(id, 1), database.to_bytes().into()).await.unwrap();
+    let stored = store
+        .put(&key::motion_database(id, 1, 1, "index.mdb").unwrap(), database.to_bytes().into())
+        .await
+        .unwrap();
     let sql = "INSERT INTO motion_databases
                    (id, project_id, name, version, store_key, bytes, blake3, num_poses, num_clips, ready_at)
                VALUES ($1, $2, 'walks', 1, $3, $4, $5, $6, $7, now())";
@@ -216,6 +222,7 @@ async fn index_walks(store: &Store, pool: &PgPool, project: Uuid) -> MotionDatab
         version: 1,
         store_key: stored.key.into(),
         blake3: stored.blake3,
+        gplvm: None,
     }
 }
 

@@ -1,0 +1,39 @@
+//! What jobs are given: payloads that the gateway enqueues and a service runs.
+//!
+//! A payload names everything that the job reads, store keys included, so that a job gives the same result whatever is
+//! uploaded, built or deleted after it was asked for. The same JSON is the run's `parameters`, which the user sees.
+
+mod augment;
+mod database;
+
+pub use augment::{Augment, Error};
+pub use database::{
+    MotionDatabaseFile, MotionDatabaseName, PLAN_MOTION_DATABASE, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm,
+};
+
+use serde::{Deserialize, Serialize};
+
+/// An uploaded file as a job sees it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputFile {
+    /// Name given by the user.
+    pub name: String,
+    /// `skeleton`, `control-points`, `ground-truth` or `motion`.
+    #[serde(default)]
+    pub role: String,
+    /// Where it is in the object store.
+    pub store_key: String,
+    /// Size, bytes.
+    pub bytes: u64,
+    /// BLAKE3 of the content, hex.
+    pub blake3: String,
+}
+
+/// Something an earlier job wrote.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Object {
+    /// Where it is in the object store.
+    pub store_key: String,
+    /// BLAKE3 of the content, hex.
+    pub blake3: String,
+}

@@ -1,0 +1,91 @@
+//! The job that reads the motion files of one part and brings them into the coordinates of the database.
+
+use crate::{
+    IMPORT_MOTION,
+    inputs::{self, Reader},
+    payload::{ImportMotion, PartClip, PartReport},
+    plan_job::no_database,
+};
+use bytes::Bytes;
+use motion_db::{Augment, MotionDatabase};
+use payloads::Object;
+use queue::{Handler, JobContext, JobError, Outcome};
+use service::{compute, objects};
+use store::Store;
+
+/// The artefact that holds the part: a database; there is none if all clips were too short.
+pub(crate) const PART: &str = "part.mdb";
+/// The artefact that says what is in it.
+pub(crate) const REPORT: &str = "part.json";
+
+pub(crate) struct ImportHandler {
+    store: Store,
+}
+
+impl ImportHandler {
+    pub fn new(store: Store) -> Self {
+        Self { store }
+    }
+
+    async fn read(&self, name: &str, object: &Object) -> Result<Bytes, JobError> {
+        let input = objects::Input { name, store_key: &object.store_key, blake3: &object.blake3 };
+        objects::read(&self.store, input, u64::MAX).await
+    }
+}
+
+impl Handler for ImportHandler {
+    fn kind(&self) -> &'static str {
+        IMPORT_MOTION
+    }
+
+    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+        objects::clean_up_earlier_attempts(&self.store, &job).await;
+        let payload: ImportMotion = job.payload()?;
+        let basis = self.read("the basis", &payload.basis).await?;
+        let skeletons = self.read("the skeletons", &payload.skeletons).await?;
+        let motions = self.read("the motions", &payload.motions).await?;
+        let of = job.clone();
+        let (part, report) =
+            compute::run(move || import(&basis, &skeletons, &motions, &payload, &of)).await?;
+        job.check()?;
+        let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
+        let report = objects::write(&self.store, &job, REPORT, "application/json", report).await?;
+        let mut outcome = Outcome::default().artefact(report);
+        if let Some(part) = part {
+            let part = objects::write(&self.store, &job, PART, "application/octet-stream", part).await?;
+            outcome = outcome.artefact(part);
+        }
+        Ok(outcome)
+    }
+}
+
+fn import(
+    basis: &[u8],
+    skeletons: &[u8],
+    motions: &[u8],
+    payload: &ImportMotion,
+    job: &JobContext,
+) -> Result<(Option<Vec<u8>>, PartReport), JobError> {
+    let basis = MotionDatabase::from_bytes(basis).map_err(JobError::retry)?;
+    let motions = inputs::unpack_packed(motions)?;
+    let mut reader = Reader::new(inputs::unpack_packed(skeletons)?, payload.bvh_metres_per_unit);
+    let augment = Augment { mirror: payload.augment.mirror, speeds: payload.augment.warps.clone() };
+    let mut part = basis.emptied();
+    let mut report = PartReport::default();
+    let num_files = motions.len();
+    for (file, motion) in motions.into_iter().enumerate() {
+        job.check()?;
+        job.progress(file as f64 / num_files as f64, format!("reading {}", motion.name));
+        let (clip, warnings) = reader.clip(motion)?;
+        report.warnings.extend(warnings);
+        let Some(clip) = clip else { continue };
+        for clip in augment.clips(&clip).map_err(|e| no_database(&e))? {
+            let num_poses = part.append(&clip).map_err(|e| no_database(&e))?;
+            if num_poses > 0 {
+                let (name, subject, action) = (clip.name, clip.subject, clip.action);
+                report.clips.push(PartClip { file, name, subject, action, num_poses });
+            }
+        }
+    }
+    Ok(((!report.clips.is_empty()).then(|| part.to_bytes()), report))
+}

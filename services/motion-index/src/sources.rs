@@ -1,0 +1,141 @@
+//! Where the clips of a database come from: the index files of the version before, and the parts that were imported.
+
+use crate::{
+    contents::{Clip, Names, names},
+    import_job::{PART, REPORT},
+    payload::{BuildMotionDatabase, PartReport},
+    plan_job::{full_name, read_artefact},
+};
+use motion_db::{MotionDatabase, trial_of};
+use queue::{Artefact, JobContext, JobError};
+use service::{compute, motion_database, motion_database::Shard};
+use sqlx::PgPool;
+use std::collections::BTreeSet;
+use store::Store;
+
+/// A file that holds clips in the coordinates of the database.
+pub(crate) enum Source {
+    /// An index file of the version before.
+    Base(Shard),
+    /// What an import job left.
+    Part(Artefact),
+}
+
+/// A clip, where it is, and what it is called in the database.
+pub(crate) struct Listed {
+    pub source: usize,
+    /// its place there
+    pub index: usize,
+    pub clip: Clip,
+}
+
+/// All that goes into a database, in order.
+#[derive(Default)]
+pub(crate) struct Sources {
+    pub files: Vec<Source>,
+    pub clips: Vec<Listed>,
+    pub warnings: Vec<String>,
+    names: Names,
+}
+
+impl Sources {
+    /// Finds and lists the clips of a build: those of its base that are kept, then those that its jobs imported.
+    ///
+    /// # Errors
+    /// If the base can't be read; tries again where an artefact can't.
+    pub async fn of(
+        job: &JobContext,
+        store: &Store,
+        pool: &PgPool,
+        payload: &BuildMotionDatabase,
+        max_bytes: u64,
+    ) -> Result<Self, JobError> {
+        let mut sources = Self::default();
+        sources.add_base(store, payload, max_bytes).await?;
+        let mut connection = pool.acquire().await?;
+        let artefacts = queue::dependency_artefacts(&mut connection, job.id()).await?;
+        drop(connection);
+        for of_job in artefacts.chunk_by(|a, b| a.job_id == b.job_id) {
+            job.check()?;
+            let named = |name: &str| of_job.iter().map(|a| &a.artefact).find(|a| a.name == name);
+            let Some(report) = named(REPORT) else { continue };
+            let report = read_artefact(store, report).await?;
+            let report: PartReport = serde_json::from_slice(&report).map_err(JobError::retry)?;
+            sources.add_part(report, named(PART));
+        }
+        Ok(sources)
+    }
+
+    async fn add_base(
+        &mut self,
+        store: &Store,
+        payload: &BuildMotionDatabase,
+        max_bytes: u64,
+    ) -> Result<(), JobError> {
+        use motion_database::Index;
+        let Some(base) = &payload.base else { return Ok(()) };
+        let failed = |error: motion_database::Error| error.of_job(&full_name(base));
+        let shards = match motion_database::read(store, &base.store_key, &base.blake3, max_bytes).await {
+            Err(error) => return Err(failed(error)),
+            Ok(Index::Whole(bytes)) => {
+                let (store_key, blake3) = (base.store_key.clone(), base.blake3.clone());
+                vec![Shard { store_key, bytes: bytes.len() as u64, blake3 }]
+            }
+            Ok(Index::Sharded(list)) => list.shards,
+        };
+        let without: BTreeSet<&str> = payload.without.iter().map(String::as_str).collect();
+        for shard in shards {
+            let database = shard.open(store, max_bytes).await.map_err(failed)?;
+            for (index, clip) in database.clips().iter().enumerate() {
+                if without.contains(clip.name.as_str()) || without.contains(trial_of(&clip.name)) {
+                    continue;
+                }
+                if trial_of(&clip.name) == clip.name {
+                    self.names.unique(&clip.name);
+                }
+                let (name, subject, action) = (clip.name.clone(), clip.subject.clone(), clip.action.clone());
+                let clip = Clip { name, subject, action, num_poses: clip.num_poses };
+                self.clips.push(Listed { source: self.files.len(), index, clip });
+            }
+            self.files.push(Source::Base(shard));
+        }
+        Ok(())
+    }
+
+    fn add_part(&mut self, report: PartReport, part: Option<&Artefact>) {
+        self.warnings.extend(report.warnings);
+        let Some(part) = part else { return };
+        let names = names(&report.clips, &mut self.names);
+        for (index, (clip, name)) in report.clips.into_iter().zip(names).enumerate() {
+            if name != clip.name && trial_of(&clip.name) == clip.name {
+                self.warnings.push(format!("another motion named {} is called {name}", clip.name));
+            }
+            let clip = Clip { name, subject: clip.subject, action: clip.action, num_poses: clip.num_poses };
+            self.clips.push(Listed { source: self.files.len(), index, clip });
+        }
+        self.files.push(Source::Part(part.clone()));
+    }
+
+    /// Opens one of the files.
+    ///
+    /// # Errors
+    /// If it can't be read.
+    pub async fn open(
+        &self,
+        source: usize,
+        store: &Store,
+        payload: &BuildMotionDatabase,
+        max_bytes: u64,
+    ) -> Result<MotionDatabase, JobError> {
+        match (&self.files[source], &payload.base) {
+            (Source::Base(shard), Some(base)) => {
+                shard.open(store, max_bytes).await.map_err(|error| error.of_job(&full_name(base)))
+            }
+            (Source::Base(_), None) => Err(JobError::retry("an index file of no base")),
+            (Source::Part(artefact), _) => {
+                let bytes = read_artefact(store, artefact).await?;
+                compute::run(move || MotionDatabase::from_bytes(&bytes)).await.map_err(JobError::retry)
+            }
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! The job that trains a latent variable model of poses on a motion database.
+
+use crate::plan_job::full_name;
+use payloads::{TRAIN_GPLVM, TrainGplvm};
+use queue::{Handler, JobContext, JobError, Outcome};
+use regression::gplvm::TrainingOptions;
+use service::{compute, config::MemoryConfig, motion_database, objects};
+use sqlx::PgConnection;
+use std::ops::ControlFlow;
+use store::{Store, Stored, key};
+
+/// Name of the model in the object store.
+const MODEL: &str = "gplvm.model";
+
+pub(crate) struct TrainHandler {
+    store: Store,
+    memory: MemoryConfig,
+}
+
+impl TrainHandler {
+    pub fn new(store: Store, memory: MemoryConfig) -> Self {
+        Self { store, memory }
+    }
+}
+
+impl Handler for TrainHandler {
+    fn kind(&self) -> &'static str {
+        TRAIN_GPLVM
+    }
+
+    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+        let request: TrainGplvm = job.payload()?;
+        let file = &request.motion_database;
+        let own = key::motion_database_job_prefix(file.id, job.id().0);
+        objects::clean_up_earlier_attempts_under(&self.store, &job, &own).await;
+        let options: TrainingOptions = serde_json::from_value(request.parameters.clone())
+            .map_err(|e| JobError::give_up(format!("parameters: {e}"), ""))?;
+        job.progress(0.0, "reading the motion database");
+        let most = self.memory.database_cache_bytes;
+        let database = motion_database::open(&self.store, &file.store_key, &file.blake3, most)
+            .await
+            .map_err(|error| error.of_job(&full_name(file)))?;
+        let of = job.clone();
+        let model = compute::run(move || {
+            let mut progress = |done: usize, planned: usize| {
+                of.progress(0.95 * done as f64 / planned.max(1) as f64, "training");
+                if of.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            let model = sparse::train_gplvm(&database, &options, &|_| false, &mut progress);
+            model.map(|model| model.to_bytes())
+        });
+        let model = model.await;
+        job.check()?;
+        let model =
+            model.map_err(|e| JobError::give_up(format!("training failed: {e}"), format!("{e:?}")))?;
+        job.progress(0.95, "storing the model");
+        let key = key::motion_database(file.id, job.id().0, job.lease_number().0, MODEL)
+            .map_err(JobError::retry)?;
+        let stored = self.store.put(&key, model.into()).await.map_err(JobError::retry)?;
+        let run = job.run_id().0;
+        Ok(Outcome::default().on_complete(move |connection| {
+            let (request, stored) = (request.clone(), stored.clone());
+            Box::pin(async move { record(connection, run, &request, &stored).await })
+        }))
+    }
+}
+
+async fn record(
+    connection: &mut PgConnection,
+    run: uuid::Uuid,
+    request: &TrainGplvm,
+    stored: &Stored,
+) -> Result<(), JobError> {
+    // Of a database that was deleted meanwhile there is nothing to record.
+    let sql = "INSERT INTO motion_database_models
+                   (motion_database_id, method, train_run_id, parameters, store_key, bytes, blake3)
+               SELECT id, 'gplvm', $2, $3, $4, $5, $6 FROM motion_databases WHERE id = $1
+               ON CONFLICT (motion_database_id, method) DO UPDATE
+               SET train_run_id = excluded.train_run_id, parameters = excluded.parameters,
+                   store_key = excluded.store_key, bytes = excluded.bytes, blake3 = excluded.blake3,
+                   trained_at = clock_timestamp()";
+    let recorded = sqlx::query(sql)
+        .bind(request.motion_database.id)
+        .bind(run)
+        .bind(&request.parameters)
+        .bind(stored.key.as_str())
+        .bind(i64::try_from(stored.bytes).unwrap_or(i64::MAX))
+        .bind(&stored.blake3)
+        .execute(connection)
+        .await?
+        .rows_affected();
+    if recorded == 1 {
+        return Ok(());
+    }
+    Err(JobError::give_up("the motion database was deleted meanwhile", request.motion_database.id))
+}
