@@ -1,6 +1,8 @@
 //! Lists are paged by cursor: newest first, so many at a time, and where to go on.
 
+use axum::Json;
 use serde::{Deserialize, Serialize};
+use sqlx::{FromRow, PgPool, postgres::PgRow};
 use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
@@ -21,14 +23,26 @@ pub(crate) struct PageQuery {
     cursor: Option<String>,
 }
 
+/// What lists are made of: its id is its place in them, as ids rise in time.
+pub(crate) trait Item: for<'r> FromRow<'r, PgRow> + Send + Unpin {
+    /// The id.
+    fn id(&self) -> Uuid;
+}
+
 impl PageQuery {
-    /// How many rows to fetch: one more than is given, to see whether there is another page.
-    pub fn fetch(&self) -> Result<i64> {
-        Ok(i64::from(self.limit()?) + 1)
+    /// The part of a list. `query`: rows of owner `$1` with an id below `$2`, newest first, at most `$3`.
+    pub async fn of<T: Item>(&self, db: &PgPool, query: &'static str, owner: Uuid) -> Result<Json<Page<T>>> {
+        let limit = self.limit()?;
+        // One more than is given, to see whether there is another page.
+        let rows = sqlx::query_as(query).bind(owner).bind(self.before()?).bind(i64::from(limit) + 1);
+        let mut items: Vec<T> = rows.fetch_all(db).await?;
+        let more = items.len() > limit as usize;
+        items.truncate(limit as usize);
+        let next = if more { items.last().map(|item| item.id().simple().to_string()) } else { None };
+        Ok(Json(Page { items, next }))
     }
 
-    /// Rows are wanted with an id below this one.
-    pub fn before(&self) -> Result<Uuid> {
+    fn before(&self) -> Result<Uuid> {
         match &self.cursor {
             None => Ok(Uuid::max()),
             Some(cursor) => Uuid::try_parse(cursor)
@@ -51,20 +65,4 @@ pub(crate) struct Page<T> {
     items: Vec<T>,
     /// give it as `cursor` to get the items after these; null when there are none
     next: Option<String>,
-}
-
-impl<T> Page<T> {
-    /// `rows`: what [`PageQuery::fetch`] asked for, in order.
-    pub fn of<R>(
-        query: &PageQuery,
-        mut rows: Vec<R>,
-        id: impl Fn(&R) -> Uuid,
-        view: impl Fn(R) -> T,
-    ) -> Result<Self> {
-        let limit = query.limit()? as usize;
-        let more = rows.len() > limit;
-        rows.truncate(limit);
-        let next = if more { rows.last().map(|row| id(row).simple().to_string()) } else { None };
-        Ok(Self { items: rows.into_iter().map(view).collect(), next })
-    }
 }

@@ -4,7 +4,10 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::lookup::{self, Latest, Lock, MotionDatabase, select_motion_databases};
+use super::{
+    contents::{self, Clip, MotionDatabaseDetails},
+    lookup::{self, Latest, Lock, MotionDatabase, select_motion_databases},
+};
 use crate::{
     App,
     access::{Reader, Writer},
@@ -23,11 +26,39 @@ pub(crate) struct NewMotionDatabase {
     /// 1 to 64 letters, digits, `.`, `_` or `-`; a name that is there gets another version
     #[schema(example = "walks")]
     name: String,
+    /// a motion database that is ready, whose clips the new one begins with: id, `name` (its latest version that is
+    /// ready) or `name@version`
+    #[schema(example = "walks@1")]
+    base: Option<String>,
+    /// clips of `base` to be left out, with all that was made from them
+    #[serde(default)]
+    #[schema(example = json!(["16_15"]))]
+    without: Vec<String>,
+}
+
+/// Most clips that one version leaves out.
+const MAX_WITHOUT: usize = 10_000;
+
+impl NewMotionDatabase {
+    fn check(&self) -> Result<()> {
+        names::check_database_name(&self.name)?;
+        if self.base.is_none() && !self.without.is_empty() {
+            return Err(Error::Unprocessable("without names clips of base, and there is no base".into()));
+        }
+        if self.without.len() > MAX_WITHOUT {
+            return Err(Error::Unprocessable(format!(
+                "without has {} clips, expected at most {MAX_WITHOUT}",
+                self.without.len()
+            )));
+        }
+        Ok(())
+    }
 }
 
 /// Make a motion database
 ///
-/// It is `open` then: upload files to it, and have it built.
+/// It is `open` then: upload files to it, and have it built. With a `base` it is that database with clips added, or
+/// left out; what there is stays as it is.
 #[utoipa::path(
     post, path = "/v1/motion-databases", tag = "motion databases", request_body = NewMotionDatabase,
     params(("Idempotency-Key" = Option<String>, Header, description = "the same key gives the same answer for a day")),
@@ -38,7 +69,7 @@ pub(super) async fn create(
     Writer(caller): Writer,
     Posted { body, request }: Posted<NewMotionDatabase>,
 ) -> Result<Answer> {
-    names::check_database_name(&body.name)?;
+    body.check()?;
     let mut tx = app.db.begin().await?;
     if let Some(answer) = request.replay(&mut tx, caller.project_id).await? {
         return Ok(answer);
@@ -48,14 +79,27 @@ pub(super) async fn create(
         .bind(caller.project_id)
         .execute(&mut *tx)
         .await?;
+    let base = match &body.base {
+        None => None,
+        Some(base) => {
+            let base =
+                lookup::motion_database(&mut tx, caller.project_id, base, Latest::Ready, Lock::Share).await?;
+            base.ready()?;
+            contents::check_clips(&mut tx, &base, &body.without).await?;
+            Some(base.id)
+        }
+    };
     let id = Uuid::now_v7();
     sqlx::query(
-        "INSERT INTO motion_databases (id, project_id, name, version)
-         SELECT $1, $2, $3, coalesce(max(version), 0) + 1 FROM motion_databases WHERE project_id = $2 AND name = $3",
+        "INSERT INTO motion_databases (id, project_id, name, version, base_id, without)
+         SELECT $1, $2, $3, coalesce(max(version), 0) + 1, $4, $5
+         FROM motion_databases WHERE project_id = $2 AND name = $3",
     )
     .bind(id)
     .bind(caller.project_id)
     .bind(&body.name)
+    .bind(base)
+    .bind(&body.without)
     .execute(&mut *tx)
     .await?;
     let database =
@@ -76,36 +120,53 @@ pub(super) async fn list(
     Reader(caller): Reader,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<MotionDatabase>>> {
-    let rows: Vec<MotionDatabase> = sqlx::query_as(select_motion_databases!(
-        "WHERE d.project_id = $1 AND d.id < $2 ORDER BY d.id DESC LIMIT $3"
-    ))
-    .bind(caller.project_id)
-    .bind(page.before()?)
-    .bind(page.fetch()?)
-    .fetch_all(&app.db)
-    .await?;
-    Ok(Json(Page::of(&page, rows, |row| row.id, |row| row)?))
+    let query = select_motion_databases!("WHERE d.project_id = $1 AND d.id < $2 ORDER BY d.id DESC LIMIT $3");
+    page.of(&app.db, query, caller.project_id).await
 }
 
 /// Show a motion database
+///
+/// With what is in it, by action and subject, and who uses it.
 #[utoipa::path(
     get, path = "/v1/motion-databases/{motion_database}", tag = "motion databases",
     params(("motion_database" = String, Path, description = "id, name (its latest version) or name@version")),
-    responses((status = 200, body = MotionDatabase)),
+    responses((status = 200, body = MotionDatabaseDetails)),
 )]
 pub(super) async fn show(
     State(app): State<App>,
     Reader(caller): Reader,
     Path(which): Path<String>,
-) -> Result<Json<MotionDatabase>> {
+) -> Result<Json<MotionDatabaseDetails>> {
     let mut db = app.db.acquire().await?;
-    Ok(Json(lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?))
+    let database =
+        lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
+    Ok(Json(contents::details(&mut db, database).await?))
+}
+
+/// List the clips of a motion database
+///
+/// In its order; none until it is ready.
+#[utoipa::path(
+    get, path = "/v1/motion-databases/{motion_database}/clips", tag = "motion databases",
+    params(("motion_database" = String, Path, description = "id, name (its latest version) or name@version")),
+    responses((status = 200, body = Vec<Clip>)),
+)]
+pub(super) async fn clips(
+    State(app): State<App>,
+    Reader(caller): Reader,
+    Path(which): Path<String>,
+) -> Result<Json<Vec<Clip>>> {
+    let mut db = app.db.acquire().await?;
+    let database =
+        lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
+    Ok(Json(contents::clips(&mut db, database.id).await?))
 }
 
 /// Delete a motion database
 ///
-/// With the files that it was built from. Refused (409) while it is being built or a run uses it; what finished runs
-/// made with it stays.
+/// With the files that it was built from and the models trained on it. Refused (409, with who it is) while it is being
+/// built, a run uses it, or a version that is not built yet is to be made from it. What finished runs made with it, and
+/// versions that were made from it, stay.
 #[utoipa::path(
     delete, path = "/v1/motion-databases/{motion_database}", tag = "motion databases",
     params(("motion_database" = String, Path, description = "id or name@version")),
@@ -120,24 +181,12 @@ pub(super) async fn delete(
         let mut tx = app.db.begin().await?;
         let database =
             lookup::motion_database(&mut tx, caller.project_id, &which, Latest::Any, Lock::Update).await?;
-        let active: i64 = sqlx::query_scalar(
-            "SELECT count(*) FROM runs WHERE (motion_database_id = $1 OR id = $2) AND finished_at IS NULL",
-        )
-        .bind(database.id)
-        .bind(database.build_run_id)
-        .fetch_one(&mut *tx)
-        .await?;
-        if active > 0 {
-            return Err(Error::Conflict(format!(
-                "{active} runs build or use motion database {}@{}; cancel them first",
-                database.name, database.version
-            )));
-        }
+        contents::check_unused(&mut tx, &database).await?;
         sqlx::query("DELETE FROM motion_databases WHERE id = $1").bind(database.id).execute(&mut *tx).await?;
-        // its builds, failed ones included, are of no use without it
+        // its builds and trainings, failed ones included, are of no use without it
         let builds: Vec<RunId> = sqlx::query_scalar(
             "DELETE FROM runs
-             WHERE kind = 'motion-database' AND project_id = $1 AND parameters->'motion_database'->>'id' = $2
+             WHERE kind IN ('motion-database', 'training') AND project_id = $1 AND parameters->'motion_database'->>'id' = $2
              RETURNING id",
         )
         .bind(caller.project_id)

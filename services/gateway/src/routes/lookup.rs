@@ -1,12 +1,16 @@
 //! Finding what a request names, in the caller's project only: what another project has is not there.
 
 use chrono::{DateTime, Utc};
+use payloads::MotionDatabaseFile;
 use serde::Serialize;
 use sqlx::PgConnection;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    page::Item,
+};
 
 /// Takes part in a lock or not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +35,12 @@ pub(crate) struct Session {
     pub tags: Vec<String>,
     /// when it was made
     pub created_at: DateTime<Utc>,
+}
+
+impl Item for Session {
+    fn id(&self) -> Uuid {
+        self.id
+    }
 }
 
 /// The session of that id in the project.
@@ -80,10 +90,16 @@ pub(crate) struct MotionDatabase {
     pub state: String,
     /// the run that builds or built it
     pub build_run_id: Option<Uuid>,
-    /// size of the index file, bytes
+    /// the version whose clips it begins with; null for one made of files alone
+    #[schema(example = "walks@1")]
+    pub base: Option<String>,
+    /// size of the index, bytes
     pub bytes: Option<i64>,
-    /// BLAKE3 of the index file, hexadecimal
+    /// BLAKE3 of the index file, or of the list of its shards, hexadecimal
     pub blake3: Option<String>,
+    /// into how many index files it is divided
+    #[schema(example = 1)]
+    pub num_shards: Option<i32>,
     /// poses at 60 frames per second
     pub num_poses: Option<i64>,
     /// motion clips
@@ -94,9 +110,47 @@ pub(crate) struct MotionDatabase {
     pub created_at: DateTime<Utc>,
     /// when it became ready
     pub ready_at: Option<DateTime<Utc>>,
-    /// where the index file is in the object store
+    /// where the index file, or the list of its shards, is in the object store
     #[serde(skip)]
     pub store_key: Option<String>,
+    #[serde(skip)]
+    pub base_id: Option<Uuid>,
+}
+
+impl Item for MotionDatabase {
+    fn id(&self) -> Uuid {
+        self.id
+    }
+}
+
+impl MotionDatabase {
+    /// As jobs name it.
+    ///
+    /// # Errors
+    /// 409 with its state, if it is not ready.
+    pub fn ready(&self) -> Result<MotionDatabaseFile> {
+        match (&self.store_key, &self.blake3) {
+            (Some(store_key), Some(blake3)) => Ok(MotionDatabaseFile {
+                id: self.id,
+                name: self.name.clone(),
+                version: self.version,
+                store_key: store_key.clone(),
+                blake3: blake3.clone(),
+                gplvm: None,
+            }),
+            _ => Err(Error::Conflict(format!(
+                "motion database {}@{} is {}, expected ready{}",
+                self.name,
+                self.version,
+                self.state,
+                match self.state.as_str() {
+                    "open" => ": upload files to it and build it",
+                    "building" => ": wait for its build",
+                    _ => ": see the error of its build",
+                }
+            ))),
+        }
+    }
 }
 
 /// The columns of [`MotionDatabase`].
@@ -108,9 +162,10 @@ macro_rules! select_motion_databases {
                          WHEN r.id IS NULL THEN 'open'
                          WHEN r.state IN ('failed', 'cancelled') THEN 'failed'
                          ELSE 'building' END AS state,
-                    d.build_run_id, d.bytes, d.blake3, d.num_poses, d.num_clips, d.skeleton,
-                    d.created_at, d.ready_at, d.store_key
-             FROM motion_databases d LEFT JOIN runs r ON r.id = d.build_run_id ",
+                    d.build_run_id, b.name || '@' || b.version AS base, d.bytes, d.blake3, d.num_shards, d.num_poses,
+                    d.num_clips, d.skeleton, d.created_at, d.ready_at, d.store_key, d.base_id
+             FROM motion_databases d LEFT JOIN runs r ON r.id = d.build_run_id
+                                     LEFT JOIN motion_databases b ON b.id = d.base_id ",
             $rest
         )
     };
@@ -122,7 +177,7 @@ pub(super) use select_motion_databases;
 pub(super) enum Latest {
     /// the newest
     Any,
-    /// the newest that is ready
+    /// the newest that is ready, or else the newest
     Ready,
 }
 
@@ -152,8 +207,8 @@ pub(super) async fn motion_database(
         (Err(_), None) => {
             sqlx::query_scalar(
                 "SELECT id FROM motion_databases
-                 WHERE project_id = $1 AND name = $2 AND (store_key IS NOT NULL OR NOT $3)
-                 ORDER BY version DESC LIMIT 1",
+                 WHERE project_id = $1 AND name = $2
+                 ORDER BY (store_key IS NOT NULL AND $3) DESC, version DESC LIMIT 1",
             )
             .bind(project_id)
             .bind(which)

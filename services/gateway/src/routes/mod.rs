@@ -1,5 +1,7 @@
 //! The handlers, by noun.
 
+mod builds;
+mod contents;
 mod databases;
 mod download;
 mod events;
@@ -38,7 +40,9 @@ pub(crate) fn described() -> OpenApiRouter<App> {
         .routes(routes!(databases::show, databases::delete))
         .routes(routes!(files::list_of_database))
         .routes(routes!(files::put_in_database, files::delete_of_database))
-        .routes(routes!(start::build))
+        .routes(routes!(databases::clips))
+        .routes(routes!(builds::build))
+        .routes(routes!(builds::train))
         .routes(routes!(runs::list))
         .routes(routes!(runs::show))
         .routes(routes!(runs::cancel))

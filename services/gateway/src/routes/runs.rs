@@ -13,7 +13,7 @@ use crate::{
     access::{Reader, Writer},
     error::{Error, Result},
     extract::{Path, Query},
-    page::{Page, PageQuery},
+    page::{Item, Page, PageQuery},
 };
 
 /// A run: what was asked for and how far it is.
@@ -21,7 +21,7 @@ use crate::{
 pub(crate) struct Run {
     /// id
     pub id: Uuid,
-    /// `reconstruction` or `motion-database`
+    /// `reconstruction`, `motion-database` (a build) or `training`
     #[schema(example = "reconstruction")]
     pub kind: String,
     /// `queued`, `running`, `succeeded`, `failed` or `cancelled`
@@ -47,6 +47,12 @@ pub(crate) struct Run {
     pub started_at: Option<DateTime<Utc>>,
     /// when it ended
     pub finished_at: Option<DateTime<Utc>>,
+}
+
+impl Item for Run {
+    fn id(&self) -> Uuid {
+        self.id
+    }
 }
 
 /// A run and its jobs.
@@ -119,14 +125,8 @@ pub(super) async fn list(
     Reader(caller): Reader,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<Run>>> {
-    let rows: Vec<Run> =
-        sqlx::query_as(select_runs!("WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3"))
-            .bind(caller.project_id)
-            .bind(page.before()?)
-            .bind(page.fetch()?)
-            .fetch_all(&app.db)
-            .await?;
-    Ok(Json(Page::of(&page, rows, |row| row.id, |row| row)?))
+    let query = select_runs!("WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3");
+    page.of(&app.db, query, caller.project_id).await
 }
 
 /// List the runs of a session
@@ -144,14 +144,9 @@ pub(super) async fn list_of_session(
 ) -> Result<Json<Page<Run>>> {
     let mut db = app.db.acquire().await?;
     lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
-    let rows: Vec<Run> =
-        sqlx::query_as(select_runs!("WHERE session_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3"))
-            .bind(session_id)
-            .bind(page.before()?)
-            .bind(page.fetch()?)
-            .fetch_all(&mut *db)
-            .await?;
-    Ok(Json(Page::of(&page, rows, |row| row.id, |row| row)?))
+    drop(db);
+    let query = select_runs!("WHERE session_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3");
+    page.of(&app.db, query, session_id).await
 }
 
 /// Show a run

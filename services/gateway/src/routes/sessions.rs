@@ -80,16 +80,9 @@ pub(super) async fn list(
     Reader(caller): Reader,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<Session>>> {
-    let rows: Vec<Session> = sqlx::query_as(
-        "SELECT id, name, tags, created_at FROM sessions
-         WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3",
-    )
-    .bind(caller.project_id)
-    .bind(page.before()?)
-    .bind(page.fetch()?)
-    .fetch_all(&app.db)
-    .await?;
-    Ok(Json(Page::of(&page, rows, |row| row.id, |row| row)?))
+    let query = "SELECT id, name, tags, created_at FROM sessions
+                 WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3";
+    page.of(&app.db, query, caller.project_id).await
 }
 
 /// Show a session

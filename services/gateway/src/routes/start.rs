@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use axum::extract::State;
+use payloads::InputFile;
 use queue::{NewJob, NewRun, ProjectId};
 use serde::Deserialize;
 use serde_json::{Map, Value};
@@ -11,8 +12,8 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{
-    files,
-    lookup::{self, Latest, Lock, MotionDatabase},
+    builds, contents, files,
+    lookup::{self, Latest, Lock},
     runs::{self, Run},
 };
 use crate::{
@@ -21,10 +22,7 @@ use crate::{
     answer::Answer,
     error::{Error, Result},
     extract::{Path, Posted},
-    jobs::{
-        BUILD_MOTION_DATABASE, BuildMotionDatabase, InputFile, MotionDatabaseFile, MotionDatabaseName,
-        PLAN_SPARSE, PlanSparse,
-    },
+    jobs::{PLAN_SPARSE, PlanSparse},
 };
 
 /// Most names in a mapping.
@@ -159,10 +157,14 @@ pub(super) async fn reconstruction(
             .await?;
     let files = inputs(&mut tx, session_id).await?;
     let parameters = body.resolve(files.iter().any(|file| file.role == "skeleton"))?;
+    let mut motion_database = database.ready()?;
+    if parameters["method"] == "gplvm" {
+        motion_database.gplvm = Some(contents::gplvm(&mut tx, &database).await?);
+    }
     let plan = PlanSparse {
         session_id,
         session_name: session.name,
-        motion_database: ready(&database)?,
+        motion_database,
         files,
         points: body.points,
         mapping: body.mapping,
@@ -182,90 +184,21 @@ pub(super) async fn reconstruction(
         parameters: serde_json::to_value(&plan)?,
     };
     let run_id = start(&mut tx, &new, PLAN_SPARSE).await?;
-    sqlx::query("UPDATE runs SET motion_database_id = $2 WHERE id = $1")
-        .bind(run_id)
-        .bind(database.id)
-        .execute(&mut *tx)
-        .await?;
-    let run = runs::find(&mut tx, project_id, run_id).await?;
-    let answer = Answer::accepted(format!("/v1/runs/{run_id}"), &run)?;
-    request.commit(tx, project_id, answer).await
-}
-
-/// Nothing is asked of a build.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct NewBuild {}
-
-/// Build a motion database
-///
-/// From the files uploaded to it, which are fixed from then on. Answers at once (202) with the run.
-#[utoipa::path(
-    post, path = "/v1/motion-databases/{motion_database}/build", tag = "motion databases",
-    params(
-        ("motion_database" = String, Path, description = "id, name or name@version"),
-        ("Idempotency-Key" = Option<String>, Header, description = "the same key gives the same answer for a day"),
-    ),
-    responses((status = 202, body = Run, headers(("Location" = String, description = "the run")))),
-)]
-pub(super) async fn build(
-    State(app): State<App>,
-    Writer(caller): Writer,
-    Path(which): Path<String>,
-    Posted { body: NewBuild {}, request }: Posted<NewBuild>,
-) -> Result<Answer> {
-    let project_id = caller.project_id;
-    let mut tx = app.db.begin().await?;
-    if let Some(answer) = request.replay(&mut tx, project_id).await? {
-        return Ok(answer);
-    }
-    let database = lookup::motion_database(&mut tx, project_id, &which, Latest::Any, Lock::Update).await?;
-    if !matches!(database.state.as_str(), "open" | "failed") {
-        return Err(Error::Conflict(format!(
-            "motion database {}@{} is {}; make a new version to build another",
-            database.name, database.version, database.state
-        )));
-    }
-    let files = inputs(&mut tx, database.id).await?;
-    if files.is_empty() {
-        return Err(Error::Unprocessable(format!(
-            "motion database {}@{} has no files; upload an archive of ASF and AMC or of BVH files first",
-            database.name, database.version
-        )));
-    }
-    let payload = BuildMotionDatabase {
-        motion_database: MotionDatabaseName {
-            id: database.id,
-            name: database.name.clone(),
-            version: database.version,
-        },
-        files,
-    };
-    let new = NewRun {
-        project_id: ProjectId(project_id),
-        kind: "motion-database",
-        session_id: None,
-        parameters: serde_json::to_value(&payload)?,
-    };
-    let run_id = start(&mut tx, &new, BUILD_MOTION_DATABASE).await?;
-    sqlx::query("UPDATE motion_databases SET build_run_id = $2 WHERE id = $1")
-        .bind(database.id)
-        .bind(run_id)
-        .execute(&mut *tx)
-        .await?;
+    builds::uses(&mut tx, run_id, Some(database.id)).await?;
     let run = runs::find(&mut tx, project_id, run_id).await?;
     let answer = Answer::accepted(format!("/v1/runs/{run_id}"), &run)?;
     request.commit(tx, project_id, answer).await
 }
 
 /// The run and its first job, whose payload is the run's parameters.
-async fn start(db: &mut PgConnection, run: &NewRun<'_>, first_job: &str) -> Result<Uuid> {
+pub(super) async fn start(db: &mut PgConnection, run: &NewRun<'_>, first_job: &str) -> Result<Uuid> {
     let run_id = queue::enqueue_run(db, run).await?;
     queue::enqueue(db, &NewJob::new(run_id, first_job, run.parameters.clone())).await?;
     Ok(run_id.0)
 }
 
-async fn inputs(db: &mut PgConnection, owner: Uuid) -> Result<Vec<InputFile>> {
+/// The files of a session or motion database, as jobs name them.
+pub(super) async fn inputs(db: &mut PgConnection, owner: Uuid) -> Result<Vec<InputFile>> {
     files::of_owner(db, owner)
         .await?
         .into_iter()
@@ -279,20 +212,4 @@ async fn inputs(db: &mut PgConnection, owner: Uuid) -> Result<Vec<InputFile>> {
             })
         })
         .collect()
-}
-
-fn ready(database: &MotionDatabase) -> Result<MotionDatabaseFile> {
-    match (&database.store_key, &database.blake3) {
-        (Some(store_key), Some(blake3)) => Ok(MotionDatabaseFile {
-            id: database.id,
-            name: database.name.clone(),
-            version: database.version,
-            store_key: store_key.clone(),
-            blake3: blake3.clone(),
-        }),
-        _ => Err(Error::Conflict(format!(
-            "motion database {}@{} is {}, expected ready",
-            database.name, database.version, database.state
-        ))),
-    }
 }
