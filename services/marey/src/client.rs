@@ -49,6 +49,8 @@ pub struct MotionDatabase {
     pub num_clips: Option<u64>,
     /// size of the index, bytes
     pub bytes: Option<u64>,
+    /// the version that it was made from
+    pub base: Option<String>,
 }
 
 /// A run.

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use serde_json::json;
+use anyhow::bail;
+use serde_json::{Map, Value, json};
 
 use crate::{
     cli::ServerArgs,
     client::{Client, MotionDatabase, Run, encode},
-    pack, watch,
+    database_show, pack, watch,
 };
 
 /// `marey db …`
@@ -15,11 +16,19 @@ use crate::{
 pub enum Command {
     #[command(after_help = "Examples:
   marey db build walks recordings/walks --watch
-  marey db build cmu subject-16.zip subject-35.tar.gz --watch
-  marey db build mine take1.bvh take2.bvh")]
+  marey db build cmu subject-16.zip subject-35.tar.gz --augment mirror,warp --watch
+  marey db build mine take1.bvh take2.bvh --bvh-metres-per-unit 0.0254")]
     Build(BuildArgs),
-    /// List motion databases
+    #[command(after_help = "Examples:
+  marey db add walks recordings/more --watch            walks@2: all of walks@1, and more
+  marey db add walks --without 16_15,16_16 --watch      walks@3: without two clips")]
+    Add(AddArgs),
+    /// List motion databases, all versions
     List(ServerArgs),
+    Show(ShowArgs),
+    #[command(after_help = "Example:
+  marey db train walks --watch && marey run \"take 3\" --database walks --method gplvm --watch")]
+    Train(TrainArgs),
     Delete(DeleteArgs),
 }
 
@@ -34,6 +43,40 @@ pub struct BuildArgs {
     /// Archives (zip, tar, tar.gz, tar.zst), folders, or ASF, AMC and BVH files
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    /// Motion to be made from the recordings: 'mirror' (left and right exchanged), 'warp' (at 0.8 and 1.25 times the
+    /// speed), or 'warp=SPEED' for other speeds; both make about six times as much of it
+    #[arg(long, value_delimiter = ',', value_name = "WAYS")]
+    augment: Vec<Augmentation>,
+    #[command(flatten)]
+    options: BuildOptions,
+}
+
+/// Make a new version of a motion database: with more recordings, or without some clips
+///
+/// The version before stays as it is, and can be deleted. What was made from its recordings (see `marey db build
+/// --augment`) is made from the new ones too.
+#[derive(Debug, clap::Args)]
+pub struct AddArgs {
+    /// The database to be added to: NAME (its latest version that is ready), NAME@VERSION, or its id
+    which: String,
+    /// Archives (zip, tar, tar.gz, tar.zst), folders, or ASF, AMC and BVH files
+    #[arg(required_unless_present = "without")]
+    files: Vec<PathBuf>,
+    /// Clips to leave out, by name (see `marey db show NAME --clips`), with all that was made from them
+    #[arg(long, value_delimiter = ',', value_name = "CLIPS")]
+    without: Vec<String>,
+    #[command(flatten)]
+    options: BuildOptions,
+}
+
+#[derive(Debug, clap::Args)]
+struct BuildOptions {
+    /// Divide it into so many index files, which replicas of motion-index share among themselves
+    #[arg(long, value_name = "N")]
+    shards: Option<usize>,
+    /// Length of one unit of BVH files in metres, as their format does not say it [default: 0.01]
+    #[arg(long, value_name = "METRES")]
+    bvh_metres_per_unit: Option<f64>,
     /// Show the progress and wait until it is built
     #[arg(long, short)]
     watch: bool,
@@ -41,7 +84,38 @@ pub struct BuildArgs {
     server: ServerArgs,
 }
 
-/// Delete a motion database
+/// Show what is in a motion database: clips and poses by action and subject
+#[derive(Debug, clap::Args)]
+pub struct ShowArgs {
+    /// The database: NAME (its latest version), NAME@VERSION, or its id
+    which: String,
+    /// List the clips too
+    #[arg(long)]
+    clips: bool,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// Train the model that `marey run --method gplvm` needs
+///
+/// It is kept with this version of the database. Takes about a minute.
+#[derive(Debug, clap::Args)]
+pub struct TrainArgs {
+    /// The database: NAME (its latest version that is ready), NAME@VERSION, or its id
+    which: String,
+    /// Parameter of the training: latent_dims=3, active=300 (poses that the model keeps), max_iterations=200
+    #[arg(long, value_name = "NAME=VALUE")]
+    set: Vec<String>,
+    /// Show the progress and wait until it is trained
+    #[arg(long, short)]
+    watch: bool,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// Delete a version of a motion database
+///
+/// Refused while it is in use; what finished runs made with it, and versions made from it, stay.
 #[derive(Debug, clap::Args)]
 pub struct DeleteArgs {
     /// The database: NAME@VERSION, or its id
@@ -50,26 +124,99 @@ pub struct DeleteArgs {
     server: ServerArgs,
 }
 
+/// A way to make more motion of what there is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Augmentation {
+    Mirror,
+    /// 0.8 and 1.25
+    Warp,
+    /// another speed
+    WarpTo(f64),
+}
+
+impl std::str::FromStr for Augmentation {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.strip_prefix("warp=").map(str::parse::<f64>)) {
+            ("mirror", _) => Ok(Self::Mirror),
+            ("warp", _) => Ok(Self::Warp),
+            (_, Some(Ok(speed))) => Ok(Self::WarpTo(speed)),
+            _ => Err("expected mirror, warp, or warp=SPEED such as warp=0.9".to_owned()),
+        }
+    }
+}
+
+/// As the server takes it.
+fn augment(ways: &[Augmentation]) -> Value {
+    let mut warps = Vec::new();
+    for way in ways {
+        match way {
+            Augmentation::Mirror => {}
+            Augmentation::Warp => warps.extend([0.8, 1.25]),
+            Augmentation::WarpTo(speed) => warps.push(*speed),
+        }
+    }
+    json!({ "mirror": ways.contains(&Augmentation::Mirror), "warps": warps })
+}
+
+impl BuildOptions {
+    /// As the server takes it.
+    fn request(&self) -> Map<String, Value> {
+        let mut request = Map::new();
+        if let Some(shards) = self.shards {
+            request.insert("shards".into(), shards.into());
+        }
+        if let Some(metres) = self.bvh_metres_per_unit {
+            request.insert("bvh_metres_per_unit".into(), metres.into());
+        }
+        request
+    }
+
+    fn finish(&self, client: &Client, (database, run): (MotionDatabase, Run)) -> anyhow::Result<()> {
+        println!("building motion database {}@{} in run {}", database.name, database.version, run.id);
+        if self.watch {
+            watch::until_end(client, &run.id)?;
+            let database: MotionDatabase = client.get(&format!("/v1/motion-databases/{}", database.id))?;
+            println!(
+                "ready: {} poses of {} clips",
+                database.num_poses.unwrap_or_default(),
+                database.num_clips.unwrap_or_default()
+            );
+        }
+        Ok(())
+    }
+}
+
 /// Runs `marey db`.
 pub fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Build(args) => {
+            let client = Client::new(args.options.server.server()?);
+            let mut request = args.options.request();
+            if !args.augment.is_empty() {
+                request.insert("augment".into(), augment(&args.augment));
+            }
+            let made = json!({ "name": args.name });
+            args.options.finish(&client, start(&client, &made, &args.files, request)?)
+        }
+        Command::Add(args) => {
+            let client = Client::new(args.options.server.server()?);
+            let base = find(&client, &args.which)?;
+            let made = json!({ "name": base.name, "base": args.which, "without": args.without });
+            args.options.finish(&client, start(&client, &made, &args.files, args.options.request())?)
+        }
+        Command::List(args) => list(&Client::new(args.server()?)),
+        Command::Show(args) => {
             let client = Client::new(args.server.server()?);
-            let (database, run) = start(&client, &args.name, &args.files)?;
-            println!("building motion database {}@{} in run {}", database.name, database.version, run.id);
-            if args.watch {
-                watch::until_end(&client, &run.id)?;
-                let database: MotionDatabase =
-                    client.get(&format!("/v1/motion-databases/{}", database.id))?;
-                println!(
-                    "ready: {} poses of {} clips",
-                    database.num_poses.unwrap_or_default(),
-                    database.num_clips.unwrap_or_default()
-                );
+            let path = format!("/v1/motion-databases/{}", encode(&args.which));
+            print!("{}", database_show::description(&client.get(&path)?));
+            if args.clips {
+                print!("{}", database_show::clips(&client.get(&format!("{path}/clips"))?));
             }
             Ok(())
         }
-        Command::List(args) => list(&Client::new(args.server()?)),
+        Command::Train(args) => train(args),
         Command::Delete(args) => {
             let client = Client::new(args.server.server()?);
             client.delete(&format!("/v1/motion-databases/{}", encode(&args.which)))?;
@@ -79,10 +226,25 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
     }
 }
 
+fn find(client: &Client, which: &str) -> anyhow::Result<MotionDatabase> {
+    client.get(&format!("/v1/motion-databases/{}", encode(which)))
+}
+
+/// Makes a database of recordings, and has it built.
+pub fn build(client: &Client, name: &str, files: &[PathBuf]) -> anyhow::Result<(MotionDatabase, Run)> {
+    start(client, &json!({ "name": name }), files, Map::new())
+}
+
 /// Makes a database, uploads its files and has it built.
-pub fn start(client: &Client, name: &str, files: &[PathBuf]) -> anyhow::Result<(MotionDatabase, Run)> {
-    let uploads = pack::pack(name, files)?;
-    let database: MotionDatabase = client.post("/v1/motion-databases", &json!({ "name": name }))?;
+fn start(
+    client: &Client,
+    made: &Value,
+    files: &[PathBuf],
+    request: Map<String, Value>,
+) -> anyhow::Result<(MotionDatabase, Run)> {
+    let name = made["name"].as_str().unwrap_or_default();
+    let uploads = if files.is_empty() { Vec::new() } else { pack::pack(name, files)? };
+    let database: MotionDatabase = client.post("/v1/motion-databases", made)?;
     for upload in uploads {
         let packed =
             if upload.num_files > 0 { format!(" ({} files)", upload.num_files) } else { String::new() };
@@ -90,8 +252,28 @@ pub fn start(client: &Client, name: &str, files: &[PathBuf]) -> anyhow::Result<(
         let path = format!("/v1/motion-databases/{}/files/{}", database.id, encode(&upload.name));
         client.put_file(&path, upload.file)?;
     }
-    let run = client.post(&format!("/v1/motion-databases/{}/build", database.id), &json!({}))?;
+    let path = format!("/v1/motion-databases/{}/build", database.id);
+    let run = client.post(&path, &Value::Object(request))?;
     Ok((database, run))
+}
+
+fn train(args: &TrainArgs) -> anyhow::Result<()> {
+    let client = Client::new(args.server.server()?);
+    let mut parameters = Map::new();
+    for set in &args.set {
+        let Some((name, value)) = set.split_once('=') else {
+            bail!("--set {set}: expected NAME=VALUE, such as latent_dims=3");
+        };
+        parameters.insert(name.to_owned(), serde_json::from_str(value).unwrap_or_else(|_| value.into()));
+    }
+    let path = format!("/v1/motion-databases/{}/train", encode(&args.which));
+    let run: Run = client.post(&path, &json!({ "method": "gplvm", "parameters": parameters }))?;
+    println!("training in run {}", run.id);
+    if args.watch {
+        watch::until_end(&client, &run.id)?;
+        println!("trained: use it by `marey run … --method gplvm`");
+    }
+    Ok(())
 }
 
 fn list(client: &Client) -> anyhow::Result<()> {
@@ -100,16 +282,32 @@ fn list(client: &Client) -> anyhow::Result<()> {
         println!("no motion databases yet; build one with `marey db build NAME FILES…`");
         return Ok(());
     }
-    println!("{:<32} {:<9} {:>10} {:>7} {:>10}", "NAME", "STATE", "POSES", "CLIPS", "MB");
+    println!("{:<32} {:<9} {:>10} {:>7} {:>10}  FROM", "NAME", "STATE", "POSES", "CLIPS", "MB");
     for database in databases {
         println!(
-            "{:<32} {:<9} {:>10} {:>7} {:>10}",
+            "{:<32} {:<9} {:>10} {:>7} {:>10}  {}",
             format!("{}@{}", database.name, database.version),
             database.state,
             database.num_poses.map_or_else(|| "-".into(), |n| n.to_string()),
             database.num_clips.map_or_else(|| "-".into(), |n| n.to_string()),
             database.bytes.map_or_else(|| "-".into(), |n| format!("{:.1}", n as f64 / 1e6)),
+            database.base.unwrap_or_default(),
         );
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ways_to_make_more_motion_are_read() {
+        let read = |text: &str| text.split(',').map(str::parse).collect::<Result<Vec<Augmentation>, _>>();
+        assert_eq!(augment(&read("mirror,warp").unwrap()), json!({"mirror": true, "warps": [0.8, 1.25]}));
+        assert_eq!(augment(&read("warp=0.9").unwrap()), json!({"mirror": false, "warps": [0.9]}));
+        for bad in ["mirrors", "warp=", "warp=fast", ""] {
+            assert!(read(bad).is_err(), "{bad:?}");
+        }
+    }
 }

@@ -180,7 +180,7 @@ fn hold_out(takes: &[Take]) -> anyhow::Result<(Vec<Take>, Vec<Take>)> {
 }
 
 fn build(client: &Client, files: &[PathBuf]) -> anyhow::Result<MotionDatabase> {
-    let (database, run) = database::start(client, "demo", files)?;
+    let (database, run) = database::build(client, "demo", files)?;
     watch::until_end(client, &run.id)?;
     client.get(&format!("/v1/motion-databases/{}", database.id))
 }

@@ -8,6 +8,7 @@ mod client;
 mod cmu;
 mod connection;
 mod database;
+mod database_show;
 mod demo;
 mod evaluate;
 mod health;

@@ -162,7 +162,6 @@ async fn start_services(
     config.worker.shutdown_grace = GRACE;
     config.worker.concurrency = args.workers.unwrap_or(config.worker.concurrency);
     let reconstruction = reconstruction::start(config.clone(), shutdown.clone()).await?;
-    config.worker.concurrency = 1;
     let motion_index = motion_index::start(config, shutdown).await?;
 
     let server =
