@@ -60,7 +60,7 @@ fn search(bencher: Bencher, poses: usize, with_controls: bool) {
     let names = ["left_wrist", "right_wrist", "left_ankle", "right_ankle", "root", "head"];
     let Ok(points) = control_points(skeleton, &names) else { return };
     let points = PointSet::new(&kinematics, points);
-    let table = ControlTable::new(&database, &index, skeleton, &kinematics, &points);
+    let table = ControlTable::new(&database, &index, skeleton, &kinematics, &points, &[], &[]);
     let mut weights = [1.0f32; 19];
     weights[18] = 4.0;
     let coordinates = motion_db::resample(&asked.motion, database.parametrisation());

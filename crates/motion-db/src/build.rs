@@ -47,7 +47,8 @@ impl SkeletonSize {
 
 impl MotionDatabase {
     /// Builds a database: every clip at 60 frames a second, in smooth coordinates about the mean rotation of
-    /// each joint, translations scaled to one leg length. Clips shorter than 8 frames are left out.
+    /// each joint, translations scaled to one leg length, and learns the performers' zero poses. Clips shorter than 8
+    /// frames are left out.
     ///
     /// # Errors
     /// If no clip is left, skeletons differ in structure, the root is not free, or there are too many poses.
@@ -78,6 +79,7 @@ impl MotionDatabase {
         if database.clips.is_empty() {
             return Err(Error::NoMotion { min_frames: MIN_FRAMES });
         }
+        database.learn_zero_poses();
         Ok(database)
     }
 
@@ -102,6 +104,7 @@ impl MotionDatabase {
             first_pose,
             num_poses,
             proportions: proportions(clip.motion.skeleton()),
+            zero_pose: Vec::new(),
         });
         Ok(())
     }

@@ -20,7 +20,7 @@ pub struct ControlTable {
     /// shape `[poses, points]`, metres, where the pose was recorded
     world: Vec<[f32; 3]>,
     /// of each window's target pose, relative to the heading frame before it, centimetres, and last the unlikeness of
-    /// its clip, `[rows, 3·points + 1]`
+    /// its clip, `[rows, 3·points·(1 + frames around) + 1]`
     pub(crate) relative: Blocks,
     /// means of `relative` over the rows of each segment of the index, shape `[segments, 3·points + 1]`
     of_segments: Vec<f32>,
@@ -64,13 +64,17 @@ fn weighted_distance(a: &[f32], b: &[f32], weights: &[f32]) -> f32 {
 }
 
 impl ControlTable {
-    /// Forward kinematics of all poses. `kinematics` and `skeleton` are the performer's.
+    /// Forward kinematics of all poses. `kinematics`, `skeleton` and `zero_pose` (radians, shape `[dofs]`) are the
+    /// performer's. With frames `around`, what a window has of the points is followed by where they are so many frames
+    /// after its target (before, if negative; a clip's first and last poses stand for what it does not have).
     pub fn new(
         database: &MotionDatabase,
         index: &WindowIndex,
         skeleton: &Skeleton,
         kinematics: &Kinematics,
         points: &PointSet,
+        zero_pose: &[f64],
+        around: &[i32],
     ) -> Self {
         let scale = SkeletonSize::leg_length(skeleton) / database.leg_length();
         let offset = skeleton.joints()[0].offset;
@@ -82,6 +86,7 @@ impl ControlTable {
         for p in 0..database.num_poses() {
             database.copy_pose(p, &mut pose);
             pose[..3].iter_mut().for_each(|v| *v *= scale);
+            pose.iter_mut().zip(zero_pose).for_each(|(v, o)| *v += o);
             frames.push(HeadingFrame::new(pose[0] + offset.x, pose[2] + offset.z, pose[kinematics::HEADING]));
             points.positions(kinematics, &pose, &mut state, &mut found);
             world.extend(found.iter().map(|p| [p.x as f32, p.y as f32, p.z as f32]));
@@ -93,13 +98,21 @@ impl ControlTable {
             squares.sqrt() * 100.0
         };
         let unlikeness: Vec<f64> = database.clips().iter().map(distance).collect();
-        let relative = Blocks::new(index.num_rows(), 3 * num_points + 1, |row, out| {
+        let width = 3 * num_points * (1 + around.len());
+        let relative = Blocks::new(index.num_rows(), width + 1, |row, out| {
             let target = index.target(row);
-            out[3 * num_points] = unlikeness[database.clip_of(target)] as f32;
-            for (point, out) in out.chunks_exact_mut(3).take(num_points).enumerate() {
-                let p = world[target * num_points + point].map(f64::from);
-                let local = frames[target - 1].local_from_world(&Vector3::from(p)) * 100.0;
-                out.copy_from_slice(&[local.x as f32, local.y as f32, local.z as f32]);
+            let number = database.clip_of(target);
+            out[width] = unlikeness[number] as f32;
+            let clip = &database.clips()[number];
+            let last = clip.first_pose + clip.num_poses - 1;
+            let frames_away = std::iter::once(0).chain(around.iter().copied());
+            for (away, out) in frames_away.zip(out.chunks_exact_mut(3 * num_points)) {
+                let pose = target.saturating_add_signed(away as isize).clamp(clip.first_pose, last);
+                for (point, out) in out.chunks_exact_mut(3).enumerate() {
+                    let p = world[pose * num_points + point].map(f64::from);
+                    let local = frames[target - 1].local_from_world(&Vector3::from(p)) * 100.0;
+                    out.copy_from_slice(&[local.x as f32, local.y as f32, local.z as f32]);
+                }
             }
         });
         let (of_segments, of_lists) = index.segments.as_ref().map_or_else(Default::default, |segments| {
@@ -138,7 +151,7 @@ impl ControlTable {
     }
 
     /// Positions of the points in a window's target pose, relative to the heading frame of the window's newest pose,
-    /// centimetres, shape `[3·points]`.
+    /// centimetres, then those in the frames around it, shape `[3·points·(1 + frames around)]`.
     pub fn copy_relative(&self, row: usize, out: &mut [f64]) {
         self.relative.copy_row(row, out);
     }

@@ -23,6 +23,9 @@ pub struct ClipInfo {
     pub num_poses: usize,
     /// proportions of the clip's skeleton, see [`proportions`]
     pub(crate) proportions: Vec<f64>,
+    /// what the performer's coordinates have over those of an average performer, radians, shape `[dofs]`, or empty if
+    /// that was not learned; see [`MotionDatabase::learn_zero_poses`]
+    pub(crate) zero_pose: Vec<f32>,
 }
 
 impl ClipInfo {
@@ -94,16 +97,20 @@ impl MotionDatabase {
         self.skeleton.num_dofs()
     }
 
-    /// Coordinates of a pose, metres and radians, shape `[dofs]`.
+    /// Coordinates of a pose as it was recorded, metres and radians, shape `[dofs]`.
     pub fn pose(&self, pose: usize) -> &[f32] {
         let dofs = self.num_dofs();
         &self.coordinates[pose * dofs..(pose + 1) * dofs]
     }
 
-    /// Copies the coordinates of a pose, metres and radians, into `out`, shape `[dofs]`.
+    /// Copies the coordinates that an average performer would have in a pose, metres and radians, into `out`, shape
+    /// `[dofs]`: the recorded ones without the zero pose of who was recorded.
     pub fn copy_pose(&self, pose: usize, out: &mut [f64]) {
         for (out, &v) in out.iter_mut().zip(self.pose(pose)) {
             *out = f64::from(v);
+        }
+        for (out, &o) in out.iter_mut().zip(&self.clips[self.clip_of(pose)].zero_pose) {
+            *out -= f64::from(o);
         }
     }
 

@@ -32,6 +32,7 @@ struct ClipRecord {
     action: String,
     num_poses: usize,
     proportions_m: Vec<f64>,
+    zero_pose_rad: Vec<f32>,
 }
 
 impl MotionDatabase {
@@ -62,6 +63,7 @@ impl MotionDatabase {
                     action: c.action.clone(),
                     num_poses: c.num_poses,
                     proportions_m: c.proportions.clone(),
+                    zero_pose_rad: c.zero_pose.clone(),
                 })
                 .collect(),
         };
@@ -141,6 +143,10 @@ impl MotionDatabase {
             if clip.proportions_m.len() != 6 * skeleton.num_joints() {
                 return Err(format!("{} proportions of clip {}", clip.proportions_m.len(), clip.name));
             }
+            let zero_pose = &clip.zero_pose_rad;
+            if !(zero_pose.is_empty() || zero_pose.len() == skeleton.num_dofs()) || !zero_pose.iter().all(|o| o.is_finite()) {
+                return Err(format!("{} numbers for the zero pose of clip {}", zero_pose.len(), clip.name));
+            }
             let next = first_pose.checked_add(clip.num_poses).ok_or("a number of poses past all bounds")?;
             clips.push(ClipInfo {
                 name: clip.name,
@@ -149,6 +155,7 @@ impl MotionDatabase {
                 first_pose,
                 num_poses: clip.num_poses,
                 proportions: clip.proportions_m,
+                zero_pose: clip.zero_pose_rad,
             });
             first_pose = next;
         }

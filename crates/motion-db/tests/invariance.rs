@@ -102,7 +102,7 @@ fn the_start_of_a_moved_clip_is_found_with_its_turn_and_shift() {
         let kinematics = database.kinematics(skeleton);
         let names = ["left_wrist", "right_wrist", "left_ankle", "right_ankle"];
         let points = PointSet::new(&kinematics, control_points(skeleton, &names).unwrap());
-        let table = ControlTable::new(&database, &index, skeleton, &kinematics, &points);
+        let table = ControlTable::new(&database, &index, skeleton, &kinematics, &points, &[], &[]);
         assert!(table.unlikeness(c) < 1e-9);
         let planted = database.clips()[c].first_pose + 50;
         let offsets = [0, 3, 6, 9, 12];
@@ -142,7 +142,7 @@ fn nothing_measured_has_no_start() {
     let skeleton = database.skeleton().clone();
     let kinematics = database.kinematics(&skeleton);
     let points = PointSet::new(&kinematics, control_points(&skeleton, &["root", "head"]).unwrap());
-    let table = ControlTable::new(&database, &index, &skeleton, &kinematics, &points);
+    let table = ControlTable::new(&database, &index, &skeleton, &kinematics, &points, &[], &[]);
     assert!(start_poses(&database, &table, &[0, 3], &[None; 4], 2, 0.3, &[], 4).is_empty());
     // Offsets that no clip is long enough for.
     let observed = [Some(Vector3::zeros()); 4];

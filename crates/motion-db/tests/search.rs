@@ -73,7 +73,7 @@ fn check_same(found: &[Neighbour], expected: &[Neighbour], what: &str) {
 fn check_all(database: &MotionDatabase, index: &WindowIndex, asked: &Motion, ks: &[usize]) {
     let kinematics = database.kinematics(asked.skeleton());
     let points = PointSet::new(&kinematics, control_points(asked.skeleton(), &SIX).unwrap());
-    let table = ControlTable::new(database, index, asked.skeleton(), &kinematics, &points);
+    let table = ControlTable::new(database, index, asked.skeleton(), &kinematics, &points, &[], &[]);
     let mut weights = vec![1.0f32; 3 * SIX.len() + 1];
     // A point that was not measured, and the unlikeness of skeletons.
     weights[3..6].fill(0.0);

@@ -22,6 +22,8 @@ mod reconstruct;
 mod session;
 mod tracker;
 mod training;
+mod uncertainty;
+mod zero_pose;
 
 pub use chunks::{Chunk, Merged, merge, plan_chunks};
 pub use error::Error;

@@ -8,7 +8,8 @@ use kinematics::State;
 use model::Samples;
 use nalgebra::Vector3;
 
-use crate::tracker::{Step, Track, Tracker};
+use crate::tracker::{Observed, Step, Track, Tracker};
+use crate::uncertainty::Uncertainty;
 use crate::{FrameQuality, Reconstructor, Result};
 use contest::Contest;
 use recent::Recent;
@@ -55,6 +56,7 @@ pub struct Live<'a> {
     has_pose: bool,
     joints: State,
     deviations: Vec<f64>,
+    uncertainty: Uncertainty,
 }
 
 impl<'a> Live<'a> {
@@ -80,6 +82,7 @@ impl<'a> Live<'a> {
             has_pose: false,
             joints: kinematics.state(),
             deviations: vec![0.0; dofs],
+            uncertainty: Uncertainty::new(&reconstructor.zero_pose_variance),
         })
     }
 
@@ -133,6 +136,7 @@ impl<'a> Live<'a> {
         }
         let first = self.contest.search(self.reconstructor, &self.recent, &self.tracker)?;
         self.has_leader = self.contest.take_first(&self.tracker, &mut self.leader, first);
+        self.uncertainty.restart();
         self.lost = 0;
         self.has_leader.then_some(())
     }
@@ -141,13 +145,13 @@ impl<'a> Live<'a> {
     fn step(&mut self) -> Step {
         let samples = Samples { positions: &self.positions, sigmas: &self.sigmas };
         self.contest.step(&mut self.tracker, samples);
-        self.tracker.step(&mut self.leader, samples)
+        self.tracker.step(&mut self.leader, Observed { now: samples, session: None })
     }
 
     fn quality(&mut self, step: &Step) -> FrameQuality {
         FrameQuality {
             residual_m: step.solution.residual_m,
-            sigma_rad: self.tracker.standard_deviations(&mut self.deviations),
+            sigma_rad: self.tracker.standard_deviations(&mut self.uncertainty, &mut self.deviations),
             energy: step.energy(),
             neighbour_distance_deg: step.neighbour_distance,
             measured_points: step.measured / 3,

@@ -121,6 +121,13 @@ pub struct Parameters {
     pub warm_up_frames: usize,
     /// frames over which neighbouring chunks are blended
     pub blend_frames: usize,
+    /// whether the zero pose of a performer who is not in the database is learned from their first frames
+    pub learn_zero_pose: bool,
+    /// frames that it is learned from
+    pub zero_pose_frames: usize,
+    /// whether a frame is also compared with what was measured 0.1 s and 0.2 s before and after it: better, but not for
+    /// live streams
+    pub smooth: bool,
     /// whether a session without a skeleton gets one that is fitted to its points, or else the database's own
     pub fit_skeleton: bool,
     /// whether standing feet are kept from sliding
@@ -147,6 +154,9 @@ impl Default for Parameters {
             lpca_smooth_deg: 2.0,
             lpcr_components: 1024,
             gplvm_smooth_deg: 3.0,
+            learn_zero_pose: true,
+            zero_pose_frames: 120,
+            smooth: false,
             max_steps: 12,
             start_candidates: 8,
             start_frames: 24,
@@ -185,6 +195,7 @@ impl Parameters {
         count("max_steps", self.max_steps, 1, 100, "1 to 100")?;
         count("start_candidates", self.start_candidates, 1, 64, "1 to 64")?;
         count("start_frames", self.start_frames, 1, 240, "1 to 240 frames")?;
+        count("zero_pose_frames", self.zero_pose_frames, 1, 6_000, "1 to 6000 frames")?;
         count("lost_frames", self.lost_frames, 1, 10_000, "1 to 10000 frames")?;
         count("chunk_frames", self.chunk_frames, 60, 100_000, "60 to 100000 frames")?;
         count("warm_up_frames", self.warm_up_frames, 0, 6_000, "0 to 6000 frames")?;

@@ -8,15 +8,19 @@ use regression::gplvm::Gplvm;
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{Reader, Writer};
-use crate::tracker::{Track, Tracker};
+use crate::tracker::{Observed, Track, Tracker};
+use crate::uncertainty::Uncertainty;
 use crate::{Error, Parameters, Result, Session};
 
-const MAGIC: &[u8; 8] = b"MAREYREC";
+const MAGIC: &[u8; 8] = b"MAREYRE2";
 /// Numbers a frame's quality is written as.
 const QUALITY_NUMBERS: usize = 5;
 
 /// Start poses that are run over all of the frames on which they are compared.
 const FINALISTS: usize = 3;
+
+/// Frames around a frame whose measured points join its search, if the future is known: 0.1 s and 0.2 s away.
+const AROUND: [i32; 4] = [-12, -6, 6, 12];
 
 /// A start pose on trial.
 struct Probe {
@@ -48,6 +52,8 @@ pub struct Reconstruction {
     pub first_frame: usize,
     /// smooth coordinates (see [`kinematics::Parametrisation::smooth`]), metres and radians, shape `[frames, dofs]`
     pub coordinates: Vec<f64>,
+    /// standard deviations of `coordinates`, shape `[frames, dofs]`
+    pub sigmas: Vec<f64>,
     /// shape `[frames]`
     pub quality: Vec<FrameQuality>,
 }
@@ -66,6 +72,7 @@ impl Reconstruction {
         let dofs = self.coordinates.len().checked_div(frames).unwrap_or(0);
         let mut writer = Writer::new(MAGIC, &Header { first_frame: self.first_frame, frames, dofs });
         writer.numbers(&self.coordinates);
+        writer.numbers(&self.sigmas);
         for q in &self.quality {
             writer.numbers(&[
                 q.residual_m,
@@ -85,6 +92,7 @@ impl Reconstruction {
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let (header, mut reader): (Header, _) = Reader::new(bytes, MAGIC, "reconstruction artefact")?;
         let coordinates = reader.numbers(header.frames.checked_mul(header.dofs))?;
+        let sigmas = reader.numbers(header.frames.checked_mul(header.dofs))?;
         let numbers = reader.numbers(header.frames.checked_mul(QUALITY_NUMBERS))?;
         reader.end()?;
         let quality = numbers.as_chunks::<QUALITY_NUMBERS>().0.iter().map(|n| FrameQuality {
@@ -94,7 +102,7 @@ impl Reconstruction {
             neighbour_distance_deg: n[3],
             measured_points: n[4] as usize,
         });
-        Ok(Self { first_frame: header.first_frame, coordinates, quality: quality.collect() })
+        Ok(Self { first_frame: header.first_frame, coordinates, sigmas, quality: quality.collect() })
     }
 }
 
@@ -107,6 +115,12 @@ pub struct Reconstructor<'a> {
     pub(crate) kinematics: Kinematics,
     pub(crate) points: PointSet,
     pub(crate) table: Arc<ControlTable>,
+    /// the performer's zero pose, radians, shape `[dofs]`
+    pub(crate) zero_pose: Vec<f64>,
+    /// variance of what is not known of it, radians², shape `[dofs]`
+    pub(crate) zero_pose_variance: Vec<f64>,
+    /// frames around a frame that join its search
+    pub(crate) around: &'static [i32],
     pub(crate) model: Option<&'a Gplvm>,
     /// windows and poses that may not be used, in rising order
     pub(crate) exclude_rows: Vec<Range<usize>>,
@@ -126,16 +140,16 @@ impl<'a> Reconstructor<'a> {
         session: &'a Session,
         parameters: &'a Parameters,
     ) -> Result<Self> {
-        Self::with_table(
-            database,
-            index,
-            session,
-            parameters,
-            control_table(database, index, session)?.into(),
-        )
+        parameters.check()?;
+        check_structure(database, session)?;
+        let zero_pose = database.zero_pose_prior(&session.skeleton).mean;
+        let around: &[i32] = if parameters.smooth { &AROUND } else { &[] };
+        let table = control_table_of(database, index, session, &zero_pose, around)?.into();
+        Ok(Self { around, ..Self::with_table(database, index, session, parameters, table)? })
     }
 
-    /// As [`Self::new`], with the [`control_table`] of the same database, index and session made before.
+    /// As [`Self::new`], with the [`control_table`] of the same database, index and session made before, and without the
+    /// frames around a frame ([`Parameters::smooth`]).
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -157,7 +171,11 @@ impl<'a> Reconstructor<'a> {
         }
         let kinematics = database.kinematics(&session.skeleton);
         let points = PointSet::new(&kinematics, session.points.clone());
+        let zero_pose = database.zero_pose_prior(&session.skeleton);
         Ok(Self {
+            zero_pose_variance: zero_pose.variances(),
+            zero_pose: zero_pose.mean,
+            around: &[],
             database,
             index,
             session,
@@ -194,6 +212,13 @@ impl<'a> Reconstructor<'a> {
         }
     }
 
+    /// What was measured at a frame of the session.
+    pub(crate) fn observed(&self, frame: usize) -> Observed<'_> {
+        let trajectories = &self.session.trajectories;
+        let session = (!self.around.is_empty()).then_some((trajectories, frame));
+        Observed { now: trajectories.samples(frame), session }
+    }
+
     /// Reconstructs `frames` of the session in order. `progress` is called after every frame with the number of frames
     /// done, and may stop it. The same arguments always give the same bits.
     ///
@@ -214,29 +239,33 @@ impl<'a> Reconstructor<'a> {
         let mut reconstruction = Reconstruction {
             first_frame: frames.start,
             coordinates: Vec::with_capacity(frames.len() * dofs),
+            sigmas: Vec::with_capacity(frames.len() * dofs),
             quality: Vec::with_capacity(frames.len()),
         };
         let mut sigmas = vec![0.0; dofs];
+        let mut uncertainty = Uncertainty::new(&self.zero_pose_variance);
         let mut track = self.start(&mut tracker, frames.start, None)?;
         let mut before = track.clone();
         let mut lost = 0;
         for frame in frames.clone() {
             before.copy_from(&track);
-            let mut step = tracker.step(&mut track, self.session.trajectories.samples(frame));
+            let mut step = tracker.step(&mut track, self.observed(frame));
             lost = if step.energy() > self.parameters.lost_energy { lost + 1 } else { 0 };
             if lost >= self.parameters.lost_frames {
                 lost = 0;
+                uncertainty.restart();
                 track = self.start(&mut tracker, frame, Some(before.clone()))?;
-                step = tracker.step(&mut track, self.session.trajectories.samples(frame));
+                step = tracker.step(&mut track, self.observed(frame));
             }
             reconstruction.coordinates.extend_from_slice(track.newest());
             reconstruction.quality.push(FrameQuality {
                 residual_m: step.solution.residual_m,
-                sigma_rad: tracker.standard_deviations(&mut sigmas),
+                sigma_rad: tracker.standard_deviations(&mut uncertainty, &mut sigmas),
                 energy: step.energy(),
                 neighbour_distance_deg: step.neighbour_distance,
                 measured_points: step.measured / 3,
             });
+            reconstruction.sigmas.extend_from_slice(&sigmas);
             if progress(frame - frames.start + 1).is_break() {
                 return Err(Error::Stopped { frame });
             }
@@ -247,7 +276,7 @@ impl<'a> Reconstructor<'a> {
     /// The best of several beginnings at `frame` (method §2, mend 8): database poses whose control points fit the
     /// coming frames, each run over these frames, and `current` among them if there is one. The one that makes the
     /// measurements most probable wins.
-    fn start(&self, tracker: &mut Tracker<'_>, frame: usize, current: Option<Track>) -> Result<Track> {
+    pub(crate) fn start(&self, tracker: &mut Tracker<'_>, frame: usize, current: Option<Track>) -> Result<Track> {
         let trajectories = &self.session.trajectories;
         // Without two measured points there is nothing to fit: look at the first frame that has them.
         let has_two = |f: &usize| trajectories.frame(*f).iter().filter(|p| p.x.is_finite()).count() >= 2;
@@ -278,7 +307,7 @@ impl<'a> Reconstructor<'a> {
             for probe in &mut probes {
                 for f in part.clone() {
                     probe.surprise +=
-                        tracker.step(&mut probe.now, trajectories.samples(f)).solution.surprise();
+                        tracker.step(&mut probe.now, self.observed(f)).solution.surprise();
                 }
             }
             probes.sort_by(|a, b| a.surprise.total_cmp(&b.surprise));
@@ -299,9 +328,22 @@ pub fn control_table(
     session: &Session,
 ) -> Result<ControlTable> {
     check_structure(database, session)?;
+    let zero_pose = database.zero_pose_prior(&session.skeleton).mean;
+    control_table_of(database, index, session, &zero_pose, &[])
+}
+
+/// The same for a performer whose zero pose is known, with what is measured in the frames `around` each.
+pub(crate) fn control_table_of(
+    database: &MotionDatabase,
+    index: &WindowIndex,
+    session: &Session,
+    zero_pose: &[f64],
+    around: &[i32],
+) -> Result<ControlTable> {
+    check_structure(database, session)?;
     let kinematics = database.kinematics(&session.skeleton);
     let points = PointSet::new(&kinematics, session.points.clone());
-    Ok(ControlTable::new(database, index, &session.skeleton, &kinematics, &points))
+    Ok(ControlTable::new(database, index, &session.skeleton, &kinematics, &points, zero_pose, around))
 }
 
 fn check_structure(database: &MotionDatabase, session: &Session) -> Result<()> {

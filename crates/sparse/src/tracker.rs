@@ -1,18 +1,20 @@
 use std::ops::Range;
 
 use kinematics::Kinematics;
-use model::Samples;
+use model::{PointTrajectories, Samples};
 use motion_db::{
     ControlTable, HeadingFrame, MotionDatabase, Neighbour, Query, Scratch, SkeletonSize, StartPose,
     WindowIndex,
 };
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, DVector, Vector3};
 use posterior::{ControlPoints, GaussianPrior, MapSolver, Measurement, Solution};
 use regression::gplvm::TrainingOptions;
 use regression::{Prediction, Predictor};
 
 use crate::examples::ExampleBuffer;
 use crate::methods::predictor;
+use crate::uncertainty::Uncertainty;
+use crate::zero_pose::Information;
 use crate::{Covariance, Parameters, Reconstructor, Result};
 
 /// Standard deviations of samples are taken into this range, metres: beyond it the solver's arithmetic ends.
@@ -22,6 +24,18 @@ const MAX_SIGMA_M: f64 = 1e3;
 /// weight falls with the inverse. Neighbours are a few degrees away, which one centimetre of a control point is compared
 /// with: two of noise do not lead the search astray.
 const SEARCH_SIGMA_M: f64 = 0.02;
+/// Least standard deviation of a point, metres, where a zero pose is learned: bone lengths are no better known.
+const MIN_ZERO_POSE_SIGMA_M: f64 = 0.005;
+/// What a point in a frame around counts for in search and regression, relative to one in the frame itself.
+const AROUND_WEIGHT: f64 = 0.5;
+
+/// What was measured at a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Observed<'a> {
+    pub now: Samples<'a>,
+    /// all that was measured, and the index of the frame, where the frames around it join the search
+    pub session: Option<(&'a PointTrajectories, usize)>,
+}
 
 /// What is known of the person at a frame: the last m poses, newest first, in world coordinates (metres, radians,
 /// the performer's scale), and the rows that matched last.
@@ -80,6 +94,9 @@ pub struct Tracker<'a> {
     pub table: &'a ControlTable,
     parameters: &'a Parameters,
     kinematics: &'a Kinematics,
+    /// the performer's, radians
+    zero_pose: &'a [f64],
+    around: &'a [i32],
     /// database translation per session translation
     scale: f64,
     root_offset: Vector3<f64>,
@@ -114,9 +131,10 @@ impl<'a> Tracker<'a> {
     pub fn new(reconstructor: &'a Reconstructor<'_>) -> Result<Self> {
         let Reconstructor { database, index, session, parameters, kinematics, points, table, .. } =
             reconstructor;
+        let around = reconstructor.around;
         let dofs = database.num_dofs();
         let k = parameters.neighbours;
-        let num_controls = 3 * points.len();
+        let num_controls = 3 * points.len() * (1 + around.len());
         let width = index.width() + if parameters.control_points_in_query { num_controls } else { 0 };
         let mut control_weights = vec![0.0; num_controls + 1];
         control_weights[num_controls] = parameters.skeleton_weight.powi(2) as f32;
@@ -147,6 +165,8 @@ impl<'a> Tracker<'a> {
             table,
             parameters,
             kinematics,
+            zero_pose: &reconstructor.zero_pose,
+            around,
             exclude: &reconstructor.exclude_rows,
         })
     }
@@ -165,6 +185,7 @@ impl<'a> Tracker<'a> {
         for (back, pose) in track.history.iter_mut().enumerate() {
             self.database.copy_pose(start.pose - 1 - back, pose);
             pose[..3].iter_mut().for_each(|v| *v /= self.scale);
+            pose.iter_mut().zip(self.zero_pose).for_each(|(v, o)| *v += o);
             let root = Vector3::new(pose[0], 0.0, pose[2]) + self.root_offset;
             let root = turned.world_from_local(&root) - self.root_offset;
             pose[0] = root.x + start.shift[0];
@@ -175,9 +196,12 @@ impl<'a> Tracker<'a> {
     }
 
     /// Takes `track` one frame further with what was measured in that frame.
-    pub fn step(&mut self, track: &mut Track, measured: Samples<'_>) -> Step {
+    pub fn step(&mut self, track: &mut Track, observed: Observed<'_>) -> Step {
         let frame = HeadingFrame::of(track.newest());
-        self.measure(&frame, measured);
+        self.measure(&frame, observed.now);
+        if let Some((trajectories, now)) = observed.session {
+            self.measure_around(&frame, trajectories, now);
+        }
         self.find_neighbours(track);
         self.predict();
         let mut solution = self.solve();
@@ -211,15 +235,16 @@ impl<'a> Tracker<'a> {
 
     /// Whether the prediction, seen from the pose found, has changed.
     fn relinearise(&mut self, solution: &Solution) -> bool {
-        for ((out, x), factor) in self.found.iter_mut().zip(self.solver.coordinates()).zip(&self.local) {
+        let neutral = self.solver.coordinates().iter().zip(self.zero_pose).map(|(x, o)| x - o);
+        for ((out, x), factor) in self.found.iter_mut().zip(neutral).zip(&self.local) {
             *out = x / factor;
         }
         self.predictor.relinearise(&self.found, solution.likelihood_energy, &mut self.prediction)
     }
 
     /// Mean posterior standard deviation over the joint angles of the last step, radians; `all` receives every
-    /// coordinate's, shape `[dofs]`.
-    pub fn standard_deviations(&mut self, all: &mut [f64]) -> f64 {
+    /// coordinate's, shape `[dofs]`. `before` is what was uncertain of the frames before.
+    pub fn standard_deviations(&mut self, before: &mut Uncertainty, all: &mut [f64]) -> f64 {
         self.solver.standard_deviations(
             self.kinematics,
             &mut self.likelihood,
@@ -227,8 +252,60 @@ impl<'a> Tracker<'a> {
             &self.prior,
             all,
         );
+        let dofs = all.len();
+        before.update(|d| self.prior.covariance[d * dofs + d], all);
         let angles = &all[kinematics::ROOT_DOFS..];
         angles.iter().sum::<f64>() / angles.len().max(1) as f64
+    }
+
+    /// Adds what the last frame says of the performer's zero pose, beside what is assumed of it, counted `share` times.
+    pub fn add_zero_pose_information(&mut self, share: f64, information: &mut Information) {
+        let dofs = self.prior.mean.len();
+        let controls = (!self.control_factors.is_empty() && self.parameters.control_points_in_query)
+            .then_some((self.table, &self.control_factors[..]));
+        let examples = self.examples.gather(self.database, self.index, &self.neighbours, controls);
+        let mut weights = vec![0.0; examples.len()];
+        regression::kernel_weights(examples.distances_squared, self.parameters.bandwidth, &mut weights);
+        // The neighbours' poses: mean, and deviations times the roots of their weights.
+        let pose = |k: usize| examples.target(k).iter().zip(&self.local).map(|(t, f)| t * f);
+        let mut mean = DVector::<f64>::zeros(dofs);
+        for (k, weight) in weights.iter().enumerate() {
+            mean.iter_mut().zip(pose(k)).for_each(|(m, x)| *m += weight * x);
+        }
+        let mut spread = DMatrix::<f64>::zeros(examples.len() + dofs, dofs);
+        for (k, weight) in weights.iter().enumerate() {
+            for (d, x) in pose(k).enumerate() {
+                spread[(k, d)] = weight.sqrt() * (x - mean[d]);
+            }
+        }
+        for (d, per_unit) in self.index.scale().per_dof.iter().enumerate() {
+            spread[(examples.len() + d, d)] = self.parameters.min_sigma_deg / per_unit;
+        }
+        let found = DVector::from_column_slice(self.solver.coordinates());
+        let mut residuals = vec![0.0; 3 * self.measured.len()];
+        let mut jacobian = vec![0.0; residuals.len() * dofs];
+        let (rows, _) = self.likelihood.residuals(
+            self.kinematics,
+            self.solver.coordinates(),
+            &self.measured,
+            &mut residuals,
+        );
+        if rows == 0 {
+            return;
+        }
+        self.likelihood.jacobian(self.kinematics, &self.measured, &mut jacobian);
+        let jacobian = DMatrix::from_row_slice(rows, dofs, &jacobian[..rows * dofs]);
+        let residual = DVector::from_column_slice(&residuals[..rows]) + &jacobian * (found - mean);
+        let spread = &jacobian * spread.transpose();
+        let mut covariance = &spread * spread.transpose();
+        for (i, m) in self.measured.iter().flatten().enumerate() {
+            for axis in 3 * i..3 * i + 3 {
+                covariance[(axis, axis)] += m.sigma.max(MIN_ZERO_POSE_SIGMA_M).powi(2);
+            }
+        }
+        let Some(factor) = covariance.cholesky() else { return };
+        information.precision += share * jacobian.transpose() * factor.solve(&jacobian);
+        information.vector += share * jacobian.transpose() * factor.solve(&residual);
     }
 
     /// Brings the measurements into the heading frame, for the solver and for the search.
@@ -240,12 +317,33 @@ impl<'a> Tracker<'a> {
             let sigma = samples.sigma(p).unwrap_or(self.parameters.control_sigma_m);
             let sigma = sigma.clamp(MIN_SIGMA_M, MAX_SIGMA_M);
             self.measured[p] = is_measured.then(|| Measurement { position: local + floor, sigma });
-            let trust = if is_measured { (SEARCH_SIGMA_M / sigma).min(1.0) } else { 0.0 };
-            let factor = trust * self.parameters.control_weight;
-            for i in 0..3 {
-                self.controls[3 * p + i] = (local[i] * 100.0) as f32;
-                self.control_weights[3 * p + i] = (factor * factor) as f32;
-                self.control_factors[3 * p + i] = factor;
+            self.compare(p, &local, is_measured.then_some(sigma), self.parameters.control_weight);
+        }
+    }
+
+    /// Puts a point (metres, relative to the heading frame) into slot `slot` of the query.
+    fn compare(&mut self, slot: usize, local: &Vector3<f64>, sigma: Option<f64>, weight: f64) {
+        let trust = sigma.map_or(0.0, |sigma| (SEARCH_SIGMA_M / sigma).min(1.0));
+        let factor = trust * weight;
+        for i in 0..3 {
+            self.controls[3 * slot + i] = (local[i] * 100.0) as f32;
+            self.control_weights[3 * slot + i] = (factor * factor) as f32;
+            self.control_factors[3 * slot + i] = factor;
+        }
+    }
+
+    /// What was measured in the frames around frame `now` joins the query.
+    fn measure_around(&mut self, frame: &HeadingFrame, trajectories: &PointTrajectories, now: usize) {
+        let floor = Vector3::new(self.root_offset.x, 0.0, self.root_offset.z);
+        let points = self.measured.len();
+        for (block, away) in self.around.iter().enumerate() {
+            let at = now.checked_add_signed(*away as isize).filter(|f| *f < trajectories.num_frames());
+            for p in 0..points {
+                let position = at.and_then(|f| trajectories.position(f, p));
+                let local = position.map_or_else(Vector3::zeros, |w| frame.local_from_world(&(w - floor)));
+                let sigma = at.and_then(|f| trajectories.sigma(f, p)).unwrap_or(self.parameters.control_sigma_m);
+                let weight = AROUND_WEIGHT * self.parameters.control_weight;
+                self.compare(points * (1 + block) + p, &local, position.map(|_| sigma), weight);
             }
         }
     }
@@ -254,6 +352,7 @@ impl<'a> Tracker<'a> {
         for (scaled, pose) in self.scaled_history.iter_mut().zip(&track.history) {
             scaled.copy_from_slice(pose);
             scaled[..3].iter_mut().for_each(|v| *v *= self.scale);
+            scaled.iter_mut().zip(self.zero_pose).for_each(|(v, o)| *v -= o);
         }
         let mut poses: [&[f64]; 16] = [&[]; 16];
         for (slot, pose) in poses.iter_mut().zip(&self.scaled_history) {
@@ -295,7 +394,7 @@ impl<'a> Tracker<'a> {
         for (d, per_unit) in self.index.scale().per_dof.iter().enumerate() {
             let factor = if d < 3 { 1.0 / (per_unit * self.scale) } else { 1.0 / per_unit };
             self.local[d] = factor;
-            self.prior.mean[d] = self.prediction.mean[d] * factor;
+            self.prior.mean[d] = self.prediction.mean[d] * factor + self.zero_pose[d];
             self.sigma[d] = self.prediction.sigma[d] * factor;
         }
         let residuals = &mut self.prediction.residuals[..self.prediction.rows * dofs];

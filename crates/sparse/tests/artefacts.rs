@@ -68,7 +68,7 @@ fn a_reconstruction_comes_back_bit_for_bit() {
     let found = short_reconstruction();
     let back = Reconstruction::from_bytes(&found.to_bytes()).unwrap();
     assert_eq!(back, found);
-    let empty = Reconstruction { first_frame: 7, coordinates: vec![], quality: vec![] };
+    let empty = Reconstruction { first_frame: 7, coordinates: vec![], sigmas: vec![], quality: vec![] };
     assert_eq!(Reconstruction::from_bytes(&empty.to_bytes()).unwrap(), empty);
 }
 

@@ -78,7 +78,7 @@ impl PointTable {
         let kinematics = database.kinematics(skeleton);
         let points = PointSet::new(&kinematics, kinematics::control_points(skeleton, names)?);
         let shortest = WindowIndex::new(database, 1)?;
-        Ok(Self(ControlTable::new(database, &shortest, skeleton, &kinematics, &points)))
+        Ok(Self(ControlTable::new(database, &shortest, skeleton, &kinematics, &points, &[], &[])))
     }
 }
 

@@ -2,7 +2,7 @@ use model::Samples;
 use motion_db::{StartPose, StartScan};
 
 use super::recent::Recent;
-use crate::tracker::{Step, Track, Tracker};
+use crate::tracker::{Observed, Step, Track, Tracker};
 use crate::{Parameters, Reconstructor};
 
 /// Tracks that run beside the leader at once: with it, four steps of the tracker a frame.
@@ -151,7 +151,7 @@ impl Contest {
         let Phase::Heat { left } = self.phase else { return };
         let counts = left + WARM_FRAMES <= self.heat_frames;
         for challenger in &mut self.challengers[..self.active] {
-            let surprise = tracker.step(&mut challenger.track, samples).solution.surprise();
+            let surprise = tracker.step(&mut challenger.track, Observed { now: samples, session: None }).solution.surprise();
             if counts {
                 challenger.surprise += surprise;
             }

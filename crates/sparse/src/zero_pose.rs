@@ -1,0 +1,106 @@
+//! Learning the zero pose of a performer who is not in the database from the first seconds of their session.
+//!
+//! Measured points c_t = f(y_t + o + e_t), where y_t is the mean of the neighbours' poses, e_t what this pose differs from
+//! them by (with their covariance) and o the performer's constant offsets. Linearised at the pose found, that is a
+//! linear-Gaussian measurement of o; its prior is what the database says of how performers differ.
+
+use std::sync::Arc;
+
+use motion_db::ZeroPosePrior;
+use nalgebra::{DMatrix, DVector};
+
+use crate::reconstruct::control_table_of;
+use crate::tracker::Tracker;
+use crate::{Parameters, Reconstructor, Result};
+
+/// The first seconds are tracked and the offsets fitted so often.
+const ROUNDS: usize = 3;
+/// Every so many frames one is looked at: the next ones say the same.
+const STRIDE: usize = 4;
+/// So many frames say as much as one that stands for itself: what a person's pose differs from its neighbours by lasts.
+const CORRELATED_FRAMES: f64 = 150.0;
+
+/// What measured frames say of the offsets: a Gaussian in information form.
+pub struct Information {
+    /// shape `[dofs, dofs]`
+    pub precision: DMatrix<f64>,
+    /// shape `[dofs]`
+    pub vector: DVector<f64>,
+}
+
+impl Reconstructor<'_> {
+    /// Learns the zero pose of a performer whose recordings the database does not hold, from the first frames
+    /// ([`Parameters::zero_pose_frames`]); without this call it is guessed from their skeleton. Does nothing for performers
+    /// in the database, or if [`Parameters::learn_zero_pose`] is off. Clips to be left out must have been excluded before
+    /// the database was built: the zero poses of others are made from them.
+    ///
+    /// # Errors
+    /// If no start pose is found or the method's model is missing.
+    pub fn learn_zero_pose(&mut self) -> Result<()> {
+        let prior = self.database.zero_pose_prior(&self.session.skeleton);
+        let Parameters { learn_zero_pose, zero_pose_frames, .. } = *self.parameters;
+        if prior.is_known || !learn_zero_pose {
+            return Ok(());
+        }
+        let Some(prior) = FreePrior::new(&prior) else { return Ok(()) };
+        let frames = zero_pose_frames.min(self.session.num_frames());
+        let dofs = self.database.num_dofs();
+        for _ in 0..ROUNDS {
+            let mut information =
+                Information { precision: DMatrix::zeros(dofs, dofs), vector: DVector::zeros(dofs) };
+            let mut tracker = Tracker::new(self)?;
+            let mut track = self.start(&mut tracker, 0, None)?;
+            for frame in 0..frames {
+                tracker.step(&mut track, self.observed(frame));
+                if frame % STRIDE == 0 {
+                    tracker.add_zero_pose_information(STRIDE as f64 / CORRELATED_FRAMES, &mut information);
+                }
+            }
+            drop(tracker);
+            let Some((learned, variance)) = prior.given(&information) else { break };
+            self.zero_pose = learned;
+            self.zero_pose_variance = variance;
+            let table =
+                control_table_of(self.database, self.index, self.session, &self.zero_pose, self.around)?;
+            self.table = Arc::new(table);
+        }
+        Ok(())
+    }
+}
+
+/// A prior over those offsets that may differ from 0.
+struct FreePrior {
+    dofs: usize,
+    free: Vec<usize>,
+    precision: DMatrix<f64>,
+    mean: DVector<f64>,
+}
+
+impl FreePrior {
+    /// `None` if nothing is free, or the covariance has no inverse.
+    fn new(prior: &ZeroPosePrior) -> Option<Self> {
+        let dofs = prior.mean.len();
+        let free: Vec<usize> = (0..dofs).filter(|d| prior.covariance[d * dofs + d] > 0.0).collect();
+        let covariance =
+            DMatrix::from_fn(free.len(), free.len(), |a, b| prior.covariance[free[a] * dofs + free[b]]);
+        let precision = covariance.cholesky().filter(|_| !free.is_empty())?.inverse();
+        let mean = DVector::from_iterator(free.len(), free.iter().map(|d| prior.mean[*d]));
+        Some(Self { dofs, free, precision, mean })
+    }
+
+    /// The most probable offsets and their variances, shape `[dofs]`, radians.
+    fn given(&self, information: &Information) -> Option<(Vec<f64>, Vec<f64>)> {
+        let free = &self.free;
+        let count = free.len();
+        let measured = DMatrix::from_fn(count, count, |a, b| information.precision[(free[a], free[b])]);
+        let vector = DVector::from_iterator(count, free.iter().map(|d| information.vector[*d]));
+        let factor = (measured + &self.precision).cholesky()?;
+        let solved = factor.solve(&(vector + &self.precision * &self.mean));
+        let covariance = factor.inverse();
+        let (mut offsets, mut variances) = (vec![0.0; self.dofs], vec![0.0; self.dofs]);
+        for (i, d) in free.iter().enumerate() {
+            (offsets[*d], variances[*d]) = (solved[i], covariance[(i, i)]);
+        }
+        offsets.iter().chain(&variances).all(|o| o.is_finite()).then_some((offsets, variances))
+    }
+}
