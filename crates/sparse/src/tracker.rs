@@ -13,7 +13,7 @@ use regression::{Prediction, Predictor};
 
 use crate::examples::ExampleBuffer;
 use crate::methods::predictor;
-use crate::{Covariance, Parameters, Reconstructor, Result};
+use crate::{Covariance, Parameters, Reconstructor, Result, Stage};
 
 /// Standard deviations of samples are taken into this range, metres: beyond it the solver's arithmetic ends.
 const MIN_SIGMA_M: f64 = 1e-5;
@@ -104,6 +104,7 @@ pub struct Tracker<'a> {
     measured: Vec<Option<Measurement>>,
     local: Vec<f64>,
     found: Vec<f64>,
+    watcher: Option<&'a (dyn Fn(Stage) + Sync)>,
 }
 
 impl<'a> Tracker<'a> {
@@ -148,6 +149,7 @@ impl<'a> Tracker<'a> {
             parameters,
             kinematics,
             exclude: &reconstructor.exclude_rows,
+            watcher: reconstructor.watcher,
         })
     }
 
@@ -176,14 +178,17 @@ impl<'a> Tracker<'a> {
 
     /// Takes `track` one frame further with what was measured in that frame.
     pub fn step(&mut self, track: &mut Track, measured: Samples<'_>) -> Step {
+        self.begin(Stage::Query);
         let frame = HeadingFrame::of(track.newest());
         self.measure(&frame, measured);
         self.find_neighbours(track);
+        self.begin(Stage::Prior);
         self.predict();
         let mut solution = self.solve();
         while self.relinearise(&solution) {
             solution = self.solve();
         }
+        self.begin(Stage::Rest);
         // The oldest pose makes room for the new one.
         track.history.rotate_right(1);
         let newest = &mut track.history[0];
@@ -197,9 +202,18 @@ impl<'a> Tracker<'a> {
         Step { solution, measured, neighbour_distance: (nearest / self.query.len() as f64).sqrt() }
     }
 
+    /// Tells the watcher, if there is one, that a stage begins.
+    #[inline]
+    pub fn begin(&self, stage: Stage) {
+        if let Some(watcher) = self.watcher {
+            watcher(stage);
+        }
+    }
+
     /// The most probable pose between prediction and measurement.
     fn solve(&mut self) -> Solution {
         self.set_prior();
+        self.begin(Stage::Map);
         self.solver.solve(
             self.kinematics,
             &mut self.likelihood,
@@ -277,6 +291,7 @@ impl<'a> Tracker<'a> {
         let controls = Some((self.table, &self.controls[..], &self.control_weights[..]));
         let query =
             Query { features: &self.query_single, controls, exclude: self.exclude, hints: &track.matches };
+        self.begin(Stage::Search);
         self.index.nearest(&query, self.parameters.neighbours, &mut self.search, &mut self.neighbours);
     }
 
