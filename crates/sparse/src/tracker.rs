@@ -96,6 +96,8 @@ pub struct Tracker<'a> {
     // Query: window features in double and single precision, control points.
     scaled_history: Vec<Vec<f64>>,
     features: Vec<f64>,
+    /// the window in the units and the frame of the targets
+    recent: Vec<f64>,
     query: Vec<f64>,
     query_single: Vec<f32>,
     controls: Vec<f32>,
@@ -135,6 +137,7 @@ impl<'a> Tracker<'a> {
             neighbours: Vec::with_capacity(k),
             scaled_history: vec![vec![0.0; dofs]; parameters.window],
             features: vec![0.0; index.width()],
+            recent: vec![0.0; index.width()],
             query: vec![0.0; width],
             query_single: vec![0.0; index.width()],
             controls: vec![0.0; num_controls + 1],
@@ -275,6 +278,7 @@ impl<'a> Tracker<'a> {
         }
         let (window, controls) = self.query.split_at_mut(self.index.width());
         self.index.query_features(&poses[..self.parameters.window], &mut self.features, window);
+        self.index.scale().window_features(&poses[..self.parameters.window], &mut self.recent);
         for ((out, c), f) in controls.iter_mut().zip(&self.controls).zip(&self.control_factors) {
             *out = f64::from(*c) * f;
         }
@@ -299,7 +303,7 @@ impl<'a> Tracker<'a> {
         let controls =
             self.parameters.control_points_in_query.then_some((self.table, &self.control_factors[..]));
         let examples = self.examples.gather(self.database, self.index, &self.neighbours, controls);
-        let query = regression::Query { inputs: &self.query, recent: &self.features };
+        let query = regression::Query { inputs: &self.query, recent: &self.recent };
         self.predictor.predict(&examples, &query, &self.parameters.regression(), &mut self.prediction);
     }
 
