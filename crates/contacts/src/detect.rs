@@ -26,8 +26,8 @@ impl Default for DetectSettings {
         Self {
             low_m: 0.03,
             high_m: 0.05,
-            slow_m_s: 0.3,
-            fast_m_s: 0.5,
+            slow_m_s: 0.15,
+            fast_m_s: 0.25,
             drift_m_s: 0.12,
             shortest_s: 0.1,
             floor_range_m: 0.25,
@@ -73,7 +73,8 @@ impl Contacts {
         feet
     }
 
-    pub(crate) fn retain(&mut self, keep: impl FnMut(&Contact) -> bool) {
+    /// Leaves out the contacts that `keep` does not want.
+    pub fn retain(&mut self, keep: impl FnMut(&Contact) -> bool) {
         self.all.retain(keep);
     }
 }

@@ -17,10 +17,14 @@ pub struct HoldSettings {
     pub farthest_m: f64,
     /// standard deviation of a held point's coordinate, metres
     pub foot_sigma_m: f64,
+    /// the same for the ball of a foot whose ankle is measured: the foot is short, and turns a lot to move its ball a little
+    pub measured_foot_sigma_m: f64,
     /// standard deviation with which measured points stay where they are, metres
     pub control_sigma_m: f64,
     /// standard deviation with which angles of hips, knees and ankles stay as they are, radians
     pub leg_sigma_rad: f64,
+    /// the same for a leg whose ankle is measured, radians
+    pub measured_leg_sigma_rad: f64,
     /// standard deviation with which all other angles stay as they are, radians
     pub angle_sigma_rad: f64,
     /// standard deviation with which the root stays where it is, metres
@@ -34,10 +38,12 @@ impl Default for HoldSettings {
             ramp_frames: 5,
             farthest_m: 0.1,
             foot_sigma_m: 0.002,
+            measured_foot_sigma_m: 0.004,
             control_sigma_m: 0.0005,
             leg_sigma_rad: 0.1,
+            measured_leg_sigma_rad: 0.03,
             angle_sigma_rad: 0.005,
-            root_sigma_m: 0.005,
+            root_sigma_m: 0.003,
         }
     }
 }
@@ -47,9 +53,9 @@ impl Default for HoldSettings {
 pub struct Held {
     /// the motion; frames outside contacts and their ramps are what they were, bit by bit
     pub motion: Motion,
-    /// the contacts that are held
+    /// the contacts: of what is held, and of measured ankles, which stay as they are
     pub contacts: Contacts,
-    /// mean speed over the floor in the contacts before, centimetres a second; `None` without contacts
+    /// mean speed over the floor of what is held before, centimetres a second; `None` without contacts
     pub slide_before_cm_s: Option<f64>,
     /// the same after
     pub slide_after_cm_s: Option<f64>,
@@ -97,12 +103,17 @@ pub fn hold_feet(
             frames_changed += 1;
         }
     }
+    let mut free = contacts.clone();
+    free.retain(|contact| {
+        let is_measured = |p: usize| contact.frames.clone().any(|f| trajectories.position(f, p).is_some());
+        !solver.same[contact.point].is_some_and(is_measured)
+    });
     let motion = Motion::new(skeleton.clone(), motion.frame_rate(), values)?;
     let after = feet.tracks(&motion);
     Ok(Held {
-        slide_before_cm_s: tracks.slide_cm_s(&contacts),
-        slide_after_cm_s: after.slide_cm_s(&contacts),
-        slides_cm_s: after.slides_cm_s(&contacts),
+        slide_before_cm_s: tracks.slide_cm_s(&free),
+        slide_after_cm_s: after.slide_cm_s(&free),
+        slides_cm_s: after.slides_cm_s(&free),
         motion,
         contacts,
         frames_changed,
@@ -140,7 +151,11 @@ impl<'a> FrameSolver<'a> {
         let same = feet.points().each_ref().map(|foot| controls.iter().position(|c| is_same(foot, c)));
         let dofs = kinematics.num_dofs();
         let mut prior = GaussianPrior::new(dofs);
-        for (dof, sigma) in sigmas(skeleton, parametrisation, feet, settings).into_iter().enumerate() {
+        let legs = [0, 2].map(|ankle: usize| match same[ankle] {
+            Some(_) => settings.measured_leg_sigma_rad,
+            None => settings.leg_sigma_rad,
+        });
+        for (dof, sigma) in sigmas(skeleton, parametrisation, feet, settings, legs).into_iter().enumerate() {
             prior.covariance[dof * dofs + dof] = sigma * sigma;
         }
         Self {
@@ -178,7 +193,10 @@ impl<'a> FrameSolver<'a> {
         for (foot, target) in feet.iter_mut().enumerate() {
             *target = moves[foot].filter(|_| is_free(foot)).map(|wanted| Measurement {
                 position: self.positions[foot] + wanted.by,
-                sigma: self.settings.foot_sigma_m / wanted.firmness.powi(2),
+                sigma: match self.same[foot / 2 * 2] {
+                    Some(_) => self.settings.measured_foot_sigma_m,
+                    None => self.settings.foot_sigma_m,
+                } / wanted.firmness.powi(2),
             });
         }
         for (c, target) in controls.iter_mut().enumerate() {
@@ -195,21 +213,22 @@ impl<'a> FrameSolver<'a> {
     }
 }
 
-/// How firmly each coordinate stays, radians and metres.
+/// How firmly each coordinate stays, radians and metres; `legs`: of left and right leg, radians.
 fn sigmas(
     skeleton: &Skeleton,
     parametrisation: &Parametrisation,
     feet: &Feet,
     settings: &HoldSettings,
+    legs: [f64; 2],
 ) -> Vec<f64> {
     let of_kind =
         |dof| if parametrisation.is_angle(dof) { settings.angle_sigma_rad } else { settings.root_sigma_m };
     let mut sigmas: Vec<f64> = (0..skeleton.num_dofs()).map(of_kind).collect();
-    for foot in feet.points() {
+    for (point, foot) in feet.points().iter().enumerate() {
         let mut joint = foot.joint;
         while let Some(parent) = skeleton.joints()[joint].parent {
             for dof in skeleton.dofs(joint).filter(|d| *d >= ROOT_DOFS && parametrisation.is_angle(*d)) {
-                sigmas[dof] = settings.leg_sigma_rad;
+                sigmas[dof] = legs[point / 2];
             }
             joint = parent;
         }

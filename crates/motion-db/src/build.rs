@@ -10,7 +10,7 @@ use crate::{ClipInfo, Error, MotionDatabase, Result};
 /// Shortest clip that is kept, frames at 60 a second.
 const MIN_FRAMES: usize = 8;
 /// Largest number of poses in one database (bounds memory before it is taken: 250 bytes a pose).
-const MAX_POSES: usize = 8_000_000;
+pub(crate) const MAX_POSES: usize = 8_000_000;
 
 /// A recorded motion to be indexed.
 #[derive(Debug, Clone, PartialEq)]

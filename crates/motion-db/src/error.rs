@@ -76,12 +76,20 @@ pub enum Error {
         expected: u32,
     },
     /// The bytes were changed after they were written.
-    #[error("motion database is damaged: its checksum is {found}, expected {expected}")]
+    #[error("motion database is damaged: its {part} has checksum {found}, expected {expected}")]
     Checksum {
-        /// checksum of the bytes
+        /// which part of it
+        part: String,
+        /// checksum of the part
         found: String,
         /// checksum in the file
         expected: String,
+    },
+    /// The index file could not be written.
+    #[error("motion database cannot be written: {reason}")]
+    Write {
+        /// what the writer said
+        reason: String,
     },
     /// A window of a length that the database cannot have.
     #[error("window is {found} frames, expected 1 to {max}")]

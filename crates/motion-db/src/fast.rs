@@ -16,12 +16,14 @@ struct Effort {
 /// Starting from nothing. Measured: see docs/motion-database.md.
 const GLOBAL: Effort = Effort { lists: 96, segments: 500 };
 /// Starting from the last matches.
-const TRACKING: Effort = Effort { lists: 16, segments: 300 };
+const TRACKING: Effort = Effort { lists: 20, segments: 320 };
+/// For a query that is like nothing in the database: its neighbours are far away and spread out.
+const STRANGE: Effort = Effort { lists: 256, segments: 1_000 };
 /// Neighbours for which that much is looked at; for more, in proportion more segments.
 const NEIGHBOURS: usize = 64;
 /// A query whose tail is so many times the energy of a segment's is like nothing in the database: the leading features
 /// do not tell what is near to it.
-const STRANGE_ENERGY: f32 = 2.0;
+const STRANGE_ENERGY: f32 = 1.5;
 /// Part of its radius by which a segment may be nearer than its centre. The window at its end rarely points to the query.
 const RADIUS_PART: f32 = 0.7;
 /// Part of the neighbours that must lie where the graph leads; else it has lost the way.
@@ -145,7 +147,7 @@ impl Ask<'_> {
         }
         for i in 0..scratch.found.len() {
             let segment = number(scratch.found[i]);
-            let after = (self.segments.first[segment] + self.segments.length[segment]) as usize;
+            let after = self.segments.first[segment] as usize + self.segments.length[segment] as usize;
             if let Some(next) = self.segments.of_row(after) {
                 self.add(next, stamp, scratch);
             }
@@ -212,8 +214,9 @@ impl WindowIndex {
             }
         }
         scratch.fast.start(segments.len());
-        ask.add_nearest_lists(GLOBAL.lists, &mut scratch.fast);
-        self.look_into(&ask, k, GLOBAL.segments, scratch, out);
+        let effort = if is_strange { STRANGE } else { GLOBAL };
+        ask.add_nearest_lists(effort.lists, &mut scratch.fast);
+        self.look_into(&ask, k, effort.segments, scratch, out);
         Way::Global
     }
 

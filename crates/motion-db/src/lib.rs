@@ -1,8 +1,10 @@
 //! The motion database: recorded motion at 60 frames a second, in coordinates that know neither where on the
-//! floor the person stands nor which way they face, and exact search in it (method §2, mends 1, 2, 7 and 8).
+//! floor the person stands nor which way they face, and search in it (method §2, mends 1, 2, 7 and 8).
 //!
-//! - [`MotionDatabase`]: clips, their coordinates, and the index file.
-//! - [`WindowIndex`]: every window `Q_{t,m}` of a database, rotated to principal axes, with exact nearest neighbours.
+//! - [`MotionDatabase`]: clips and their coordinates; [`Augment`] makes more of them.
+//! - [`WindowIndex`]: every window `Q_{t,m}` of a database, rotated to principal axes, with its nearest neighbours: all of
+//!   them ([`WindowIndex::nearest`]) or nearly all, much sooner ([`WindowIndex::nearest_fast`]).
+//! - [`IndexFile`]: both in a file that is used where it lies; [`write_index`].
 //! - [`ControlTable`]: where a session's control points would be in every pose of the database.
 //! - [`start_poses`]: the poses whose control points fit the first frames of a session best.
 
@@ -33,7 +35,7 @@ pub use controls::ControlTable;
 pub use database::{ClipInfo, FRAME_RATE, MotionDatabase};
 pub use error::Error;
 pub use fast::Way;
-pub use file::FORMAT_VERSION;
+pub use file::{FORMAT_VERSION, IndexFile, write_index};
 pub use frame::HeadingFrame;
 pub use mirror::mirror;
 pub use performers::ZeroPosePrior;

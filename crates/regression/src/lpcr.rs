@@ -2,18 +2,20 @@ use crate::prediction::kernel_weights;
 use crate::principal::Principal;
 use crate::{Examples, Parameters, Prediction, Predictor, Query};
 
+/// An example that is fitted more closely than this by its own weight is taken to be fitted so.
+const LEAST_FREEDOM: f64 = 0.05;
+
 /// What [`PrincipalRegression`] depends on besides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LpcrParameters {
-    /// most principal components
+    /// most principal components; besides, never more than half the examples, which leaves the residuals their
+    /// meaning
     pub components: usize,
-    /// share of the inputs' variance beyond which no component is taken
-    pub variance: f64,
 }
 
 impl Default for LpcrParameters {
     fn default() -> Self {
-        Self { components: 1024, variance: 1.0 }
+        Self { components: 16 }
     }
 }
 
@@ -70,20 +72,14 @@ impl PrincipalRegression {
         }
         for ((u, row), freedom) in u.iter().zip(self.targets.chunks_exact_mut(dofs)).zip(&mut self.freedom) {
             add_scaled(row, -u, loading);
-            *freedom = (*freedom - u * u).max(1e-3);
+            *freedom = (*freedom - u * u).max(LEAST_FREEDOM);
         }
     }
 
     /// How many components to take.
     fn count_components(&mut self, count: usize, width: usize, dofs: usize) -> usize {
-        let total: f64 = self.principal.variances.iter().sum();
         let (mut best, mut least) = (0, self.left_out(count, dofs));
-        let mut kept = 0.0;
-        for i in 0..self.principal.len().min(self.parameters.components) {
-            if kept >= self.parameters.variance * total {
-                break;
-            }
-            kept += self.principal.variances[i];
+        for i in 0..self.principal.len().min(self.parameters.components).min(count / 2) {
             self.explain(i, count, width, dofs);
             let now = self.left_out(count, dofs);
             if now < least {
@@ -101,7 +97,7 @@ impl PrincipalRegression {
             for ((t, y), m) in target.iter_mut().zip(examples.target(k)).zip(&out.mean) {
                 *t = root * (y - m);
             }
-            self.freedom[k] = (1.0 - w).max(1e-3);
+            self.freedom[k] = (1.0 - w).max(LEAST_FREEDOM);
         }
     }
 }

@@ -109,10 +109,10 @@ mod tests {
 
     #[test]
     fn components_put_the_rows_together_again() {
-        for (count, width) in [(5, 9), (9, 5), (1, 3), (4, 4)] {
+        for (count, width) in [(5, 9), (9, 5), (1, 3), (4, 4), (64, 62), (64, 142), (100, 62)] {
             let rows: Vec<f64> =
                 (0..count * width).map(|i| (i as f64 * 0.7 + (i as f64).sqrt()).sin()).collect();
-            let mut principal = Principal::new(12, 12);
+            let mut principal = Principal::new(count + 3, width);
             principal.decompose(&rows, count, width);
             assert!(principal.variances.is_sorted_by(|a, b| a >= b));
             for (i, row) in rows.chunks_exact(width).enumerate() {

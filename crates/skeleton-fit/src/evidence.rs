@@ -1,12 +1,8 @@
 use nalgebra::{Matrix3, Vector3};
 
+use crate::FitSettings;
 use crate::shapes::{Shapes, position};
 
-/// Standard deviation of a point's coordinate about that of the recording it is compared with, metres: two people who do
-/// the same thing are so far apart.
-const KERNEL_SIGMA_M: f64 = 0.03;
-/// Spans that say what one independent span would.
-const SPANS_OF_ONE: f64 = 2.0;
 /// Recordings less likely than the likeliest by this factor (logarithm) are passed over in derivatives.
 const NEGLIGIBLE: f64 = 18.0;
 
@@ -23,6 +19,7 @@ pub type Observed = Vec<Option<Vector3<f64>>>;
 /// about y and shift on the floor. Every span of the database stands for a pose that the performer may have had: the
 /// sum over n takes the pose out of the question, so that no pose found with the wrong lengths can confirm them.
 pub struct Evidence<'a> {
+    settings: &'a FitSettings,
     shapes: &'a Shapes,
     observed: &'a [Observed],
     points: usize,
@@ -43,9 +40,15 @@ pub struct Value {
 
 impl<'a> Evidence<'a> {
     /// `observed`: spans of `points` points each; `precision`: C⁻¹.
-    pub fn new(shapes: &'a Shapes, observed: &'a [Observed], points: usize, precision: Matrix3<f64>) -> Self {
+    pub fn new(
+        shapes: &'a Shapes,
+        observed: &'a [Observed],
+        points: usize,
+        precision: Matrix3<f64>,
+        settings: &'a FitSettings,
+    ) -> Self {
         let exponents = vec![0.0; shapes.num_spans()];
-        Self { shapes, observed, points, precision, found: Vec::new(), exponents }
+        Self { settings, shapes, observed, points, precision, found: Vec::new(), exponents }
     }
 
     /// At θ, the logarithms of the limbs' scales.
@@ -53,24 +56,28 @@ impl<'a> Evidence<'a> {
         let scales = [theta.x.exp(), theta.y.exp(), theta.z.exp()];
         let weighted = self.precision * theta;
         let mut value = Value { log: -0.5 * theta.dot(&weighted), gradient: -weighted };
+        let count = self.observed.len().max(1) as f64;
+        let share = (self.settings.independent_spans / count).min(1.0);
         for observed in self.observed {
             let span = self.span(observed, &scales);
-            value.log += span.log / SPANS_OF_ONE;
-            value.gradient += span.gradient / SPANS_OF_ONE;
+            value.log += span.log * share;
+            value.gradient += span.gradient * share;
         }
         value
     }
 
     fn span(&mut self, observed: &Observed, scales: &[f64; 3]) -> Value {
-        let precision = self.points as f64 / (KERNEL_SIGMA_M * KERNEL_SIGMA_M);
-        let mut best = f64::NEG_INFINITY;
+        let precision = self.points as f64 / self.settings.kernel_sigma_m.powi(2);
+        // What no recording explains says nothing.
+        let unexplained = -0.5 * self.points as f64 * self.settings.unexplained_sigmas.powi(2);
+        let mut best = unexplained;
         for n in 0..self.shapes.num_spans() {
             self.place(n, scales);
             let fit = Fit::of(&self.found, observed);
             self.exponents[n] = -0.5 * precision * fit.mean_square;
             best = best.max(self.exponents[n]);
         }
-        let mut total = 0.0;
+        let mut total = (unexplained - best).exp();
         let mut gradient = Vector3::zeros();
         for n in 0..self.shapes.num_spans() {
             let exponent = self.exponents[n] - best;
@@ -89,13 +96,13 @@ impl<'a> Evidence<'a> {
     fn place(&mut self, n: usize, scales: &[f64; 3]) {
         let constant = self.shapes.constant();
         self.found.clear();
-        self.found.extend(self.shapes.parts(n).map(|parts| position(&constant, parts, scales)));
+        self.found.extend(self.shapes.parts(n).iter().map(|parts| position(&constant, parts, scales)));
     }
 
     /// Derivative of the mean squared distance. The best turn and shift stay the best to first order.
     fn gradient(&self, n: usize, fit: &Fit, observed: &Observed, scales: &[f64; 3]) -> Vector3<f64> {
         let mut gradient = Vector3::zeros();
-        for ((parts, found), observed) in self.shapes.parts(n).zip(&self.found).zip(observed) {
+        for ((parts, found), observed) in self.shapes.parts(n).iter().zip(&self.found).zip(observed) {
             let Some(observed) = observed else { continue };
             let back = fit.turned_back(&(fit.placed(found) - observed));
             for ((sum, part), scale) in gradient.iter_mut().zip(parts).zip(scales) {
@@ -172,14 +179,16 @@ mod tests {
         let points = control_points(&mean, &["left_wrist", "right_ankle", "head"]).unwrap();
         let shapes = Shapes::new(&database, &mean, &limbs, &points);
         let seen = |n: usize| {
-            let bigger = shapes.parts(n).map(|p| Some(position(&shapes.constant(), p, &[1.05, 0.97, 1.1])));
+            let bigger =
+                shapes.parts(n).iter().map(|p| Some(position(&shapes.constant(), p, &[1.05, 0.97, 1.1])));
             let mut seen: Observed = bigger.collect();
             seen[2] = None;
             seen
         };
         let observed = vec![seen(3), seen(40)];
         let precision = covariance.try_inverse().unwrap();
-        let mut evidence = Evidence::new(&shapes, &observed, 3, precision);
+        let settings = FitSettings::default();
+        let mut evidence = Evidence::new(&shapes, &observed, 3, precision, &settings);
         let theta = Vector3::new(0.02, -0.01, 0.03);
         let gradient = evidence.at(&theta).gradient;
         for i in 0..3 {

@@ -19,6 +19,25 @@ const MAX_STEPS: usize = 25;
 /// The ascent ends when all scales move by less (logarithm).
 const CONVERGED: f64 = 2e-4;
 
+/// What decides how far a fit trusts what it sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitSettings {
+    /// standard deviation of a point's coordinate about that of the recording it is compared with, metres: two people
+    /// who do the same thing are so far apart
+    pub kernel_sigma_m: f64,
+    /// independent spans that a session is worth at most: how a person moves is the same in all of it
+    pub independent_spans: f64,
+    /// a span farther than this from all recordings, in standard deviations of a point, is like nothing known and says
+    /// nothing
+    pub unexplained_sigmas: f64,
+}
+
+impl Default for FitSettings {
+    fn default() -> Self {
+        Self { kernel_sigma_m: 0.04, independent_spans: 1.5, unexplained_sigmas: 3.0 }
+    }
+}
+
 /// How much longer the bones of one limb are than the database's mean.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LimbScale {
@@ -55,6 +74,7 @@ pub fn fit_skeleton(
     database: &MotionDatabase,
     points: &[ControlPoint],
     trajectories: &PointTrajectories,
+    settings: &FitSettings,
 ) -> Result<FittedSkeleton> {
     let joints = database.skeleton().num_joints();
     if let Some(bad) = points.iter().find(|p| p.joint >= joints) {
@@ -71,7 +91,7 @@ pub fn fit_skeleton(
         return Err(Error::NothingToCompare { frames: SPAN_FRAMES + 1 });
     }
     let precision = population.covariance.try_inverse().unwrap_or_else(|| Matrix3::identity() * 1e3);
-    let mut evidence = Evidence::new(&shapes, &observed, points.len(), precision);
+    let mut evidence = Evidence::new(&shapes, &observed, points.len(), precision, settings);
     let (theta, covariance) = climb(&mut evidence, population.covariance);
     let scales = theta.map(f64::exp);
     let scales = [scales.x, scales.y, scales.z];

@@ -14,7 +14,7 @@ mod shapes;
 mod sizes;
 
 pub use error::Error;
-pub use fit::{FittedSkeleton, LimbScale, fit_skeleton};
+pub use fit::{FitSettings, FittedSkeleton, LimbScale, fit_skeleton};
 pub use limbs::{LIMBS, Limb, Limbs};
 pub use population::Population;
 pub use sizes::Sizes;

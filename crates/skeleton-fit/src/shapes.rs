@@ -9,8 +9,8 @@ use crate::{LIMBS, Limb, Limbs};
 pub const SPAN: [usize; 3] = [0, 6, 12];
 /// Frames from the first to the last of a span.
 pub const SPAN_FRAMES: usize = SPAN[SPAN.len() - 1];
-/// Most database poses that are looked at.
-const MAX_POSES: usize = 24_000;
+/// Most spans of a database that are looked at.
+const MAX_SPANS: usize = 6_000;
 
 /// Where control points are in poses of a database, as a function of the scales of the limbs:
 ///
@@ -25,41 +25,28 @@ pub struct Shapes {
     points: usize,
     /// the root's offset, metres, in which all points share
     constant: Vector3<f64>,
-    /// parts of each limb, metres, shape `[poses, points, 3]`
+    /// parts of each limb, metres, shape `[spans, SPAN.len(), points, 3]`
     parts: Vec<[[f32; 3]; 3]>,
-    /// first pose of every span, as an index of `parts` over points
-    spans: Vec<usize>,
-    /// poses between two that are kept
-    step: usize,
 }
 
 impl Shapes {
-    /// Of `points` (on `skeleton`) over the poses of `database`.
+    /// Of `points` (on `skeleton`) over spans of `database`, evenly spread where there are more than 6,000.
     pub fn new(
         database: &MotionDatabase,
         skeleton: &Skeleton,
         limbs: &Limbs,
         points: &[ControlPoint],
     ) -> Self {
-        // A step that divides the span's: every frame of a span is kept.
-        let wanted = database.num_poses().div_ceil(MAX_POSES);
-        let step = [1, 2, 3, 6].into_iter().find(|s| *s >= wanted).unwrap_or(6);
-        let stride = wanted.div_ceil(step);
+        let stride = database.num_poses().div_ceil(MAX_SPANS).max(1);
         let kinematics = database.kinematics(skeleton);
         let leg_parts = leg_parts(skeleton, limbs, database.leg_length());
-        let mut shapes = Self {
-            points: points.len(),
-            constant: skeleton.joints()[0].offset,
-            parts: Vec::new(),
-            spans: Vec::new(),
-            step,
-        };
+        let mut parts_of_all = Vec::new();
         let mut pose = vec![0.0; database.num_dofs()];
         let mut chain = Chain::new(skeleton, limbs, &kinematics);
         for clip in database.clips() {
-            let first = shapes.parts.len() / points.len();
-            for i in (0..clip.num_poses).step_by(step) {
-                database.copy_pose(clip.first_pose + i, &mut pose);
+            let starts = (0..clip.num_poses.saturating_sub(SPAN_FRAMES)).step_by(stride);
+            for frame in starts.flat_map(|start| SPAN.map(|offset| start + offset)) {
+                database.copy_pose(clip.first_pose + frame, &mut pose);
                 let root = Vector3::new(pose[0], pose[1], pose[2]);
                 pose[..3].fill(0.0);
                 chain.update(&kinematics, &pose);
@@ -68,28 +55,22 @@ impl Shapes {
                     for (part, share) in parts.iter_mut().zip(leg_parts) {
                         *part += root * share;
                     }
-                    shapes.parts.push(parts.map(|p| [p.x as f32, p.y as f32, p.z as f32]));
+                    parts_of_all.push(parts.map(|p| [p.x as f32, p.y as f32, p.z as f32]));
                 }
             }
-            let kept = clip.num_poses.div_ceil(step);
-            let starts = (0..kept.saturating_sub(SPAN_FRAMES / step)).step_by(stride);
-            shapes.spans.extend(starts.map(|i| (first + i) * points.len()));
         }
-        shapes
+        Self { points: points.len(), constant: skeleton.joints()[0].offset, parts: parts_of_all }
     }
 
     /// Number of spans.
     pub fn num_spans(&self) -> usize {
-        self.spans.len()
+        self.parts.len() / (SPAN.len() * self.points)
     }
 
     /// Parts of the points of a span, in the order of [`SPAN`] and then of the points.
-    pub fn parts(&self, span: usize) -> impl Iterator<Item = &[[f32; 3]; 3]> {
-        let first = self.spans[span];
-        SPAN.iter().flat_map(move |frame| {
-            let at = first + frame / self.step * self.points;
-            &self.parts[at..at + self.points]
-        })
+    pub fn parts(&self, span: usize) -> &[[[f32; 3]; 3]] {
+        let count = SPAN.len() * self.points;
+        &self.parts[span * count..(span + 1) * count]
     }
 
     /// The part that no scale changes, metres.
@@ -189,7 +170,7 @@ mod tests {
         let size = SkeletonSize::leg_length(&scaled) / database.leg_length();
         pose[..3].iter_mut().for_each(|v| *v *= size);
         set.positions(&kinematics, &pose, &mut state, &mut expected);
-        for (parts, expected) in shapes.parts(5).zip(expected) {
+        for (parts, expected) in shapes.parts(5).iter().zip(expected) {
             let found = position(&shapes.constant(), parts, &scales);
             assert!((found - expected).norm() < 1e-6, "{found} {expected}");
         }

@@ -20,6 +20,7 @@ mod methods;
 mod parameters;
 mod reconstruct;
 mod session;
+mod stage;
 mod tracker;
 mod training;
 mod uncertainty;
@@ -32,6 +33,7 @@ pub use live::{Live, LivePose, MAX_LIVE_STATE_BYTES};
 pub use parameters::{Covariance, Method, Parameters};
 pub use reconstruct::{FrameQuality, Reconstruction, Reconstructor, control_table};
 pub use session::Session;
+pub use stage::Stage;
 pub use training::train_gplvm;
 
 /// Result of the fallible functions of this crate.

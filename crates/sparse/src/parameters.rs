@@ -152,7 +152,7 @@ impl Default for Parameters {
             min_sigma_deg: 1.0,
             lpca_variance: 0.99,
             lpca_smooth_deg: 2.0,
-            lpcr_components: 1024,
+            lpcr_components: 16,
             gplvm_smooth_deg: 3.0,
             learn_zero_pose: true,
             zero_pose_frames: 120,
@@ -228,7 +228,7 @@ impl Parameters {
     }
 
     pub(crate) fn lpcr(&self) -> LpcrParameters {
-        LpcrParameters { components: self.lpcr_components, ..LpcrParameters::default() }
+        LpcrParameters { components: self.lpcr_components }
     }
 
     pub(crate) fn gplvm(&self) -> GplvmParameters {

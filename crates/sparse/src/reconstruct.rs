@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::bytes::{Reader, Writer};
 use crate::tracker::{Observed, Track, Tracker};
 use crate::uncertainty::Uncertainty;
-use crate::{Error, Parameters, Result, Session};
+use crate::{Error, Parameters, Result, Session, Stage};
 
 const MAGIC: &[u8; 8] = b"MAREYRE2";
 /// Numbers a frame's quality is written as.
@@ -122,6 +122,7 @@ pub struct Reconstructor<'a> {
     /// frames around a frame that join its search
     pub(crate) around: &'static [i32],
     pub(crate) model: Option<&'a Gplvm>,
+    pub(crate) watcher: Option<&'a (dyn Fn(Stage) + Sync)>,
     /// windows and poses that may not be used, in rising order
     pub(crate) exclude_rows: Vec<Range<usize>>,
     pub(crate) exclude_poses: Vec<Range<usize>>,
@@ -184,6 +185,7 @@ impl<'a> Reconstructor<'a> {
             points,
             table,
             model: None,
+            watcher: None,
             exclude_rows: Vec::new(),
             exclude_poses: Vec::new(),
         })
@@ -200,6 +202,12 @@ impl<'a> Reconstructor<'a> {
         }
         self.model = Some(model);
         Ok(self)
+    }
+
+    /// With somebody told whenever a stage of a frame begins, so that its time can be taken: this crate has no clock.
+    pub fn watched(mut self, watcher: &'a (dyn Fn(Stage) + Sync)) -> Self {
+        self.watcher = Some(watcher);
+        self
     }
 
     /// Leaves clips out of every search: `is_excluded` sees each clip of the database.
@@ -277,6 +285,7 @@ impl<'a> Reconstructor<'a> {
     /// coming frames, each run over these frames, and `current` among them if there is one. The one that makes the
     /// measurements most probable wins.
     pub(crate) fn start(&self, tracker: &mut Tracker<'_>, frame: usize, current: Option<Track>) -> Result<Track> {
+        tracker.begin(Stage::Start);
         let trajectories = &self.session.trajectories;
         // Without two measured points there is nothing to fit: look at the first frame that has them.
         let has_two = |f: &usize| trajectories.frame(*f).iter().filter(|p| p.x.is_finite()).count() >= 2;

@@ -15,7 +15,7 @@ use crate::examples::ExampleBuffer;
 use crate::methods::predictor;
 use crate::uncertainty::Uncertainty;
 use crate::zero_pose::Information;
-use crate::{Covariance, Parameters, Reconstructor, Result};
+use crate::{Covariance, Parameters, Reconstructor, Result, Stage};
 
 /// Standard deviations of samples are taken into this range, metres: beyond it the solver's arithmetic ends.
 const MIN_SIGMA_M: f64 = 1e-5;
@@ -113,6 +113,8 @@ pub struct Tracker<'a> {
     // Query: window features in double and single precision, control points.
     scaled_history: Vec<Vec<f64>>,
     features: Vec<f64>,
+    /// the window in the units and the frame of the targets
+    recent: Vec<f64>,
     query: Vec<f64>,
     query_single: Vec<f32>,
     controls: Vec<f32>,
@@ -121,6 +123,7 @@ pub struct Tracker<'a> {
     measured: Vec<Option<Measurement>>,
     local: Vec<f64>,
     found: Vec<f64>,
+    watcher: Option<&'a (dyn Fn(Stage) + Sync)>,
 }
 
 impl<'a> Tracker<'a> {
@@ -152,6 +155,7 @@ impl<'a> Tracker<'a> {
             neighbours: Vec::with_capacity(k),
             scaled_history: vec![vec![0.0; dofs]; parameters.window],
             features: vec![0.0; index.width()],
+            recent: vec![0.0; index.width()],
             query: vec![0.0; width],
             query_single: vec![0.0; index.width()],
             controls: vec![0.0; num_controls + 1],
@@ -168,6 +172,7 @@ impl<'a> Tracker<'a> {
             zero_pose: &reconstructor.zero_pose,
             around,
             exclude: &reconstructor.exclude_rows,
+            watcher: reconstructor.watcher,
         })
     }
 
@@ -197,17 +202,20 @@ impl<'a> Tracker<'a> {
 
     /// Takes `track` one frame further with what was measured in that frame.
     pub fn step(&mut self, track: &mut Track, observed: Observed<'_>) -> Step {
+        self.begin(Stage::Query);
         let frame = HeadingFrame::of(track.newest());
         self.measure(&frame, observed.now);
         if let Some((trajectories, now)) = observed.session {
             self.measure_around(&frame, trajectories, now);
         }
         self.find_neighbours(track);
+        self.begin(Stage::Prior);
         self.predict();
         let mut solution = self.solve();
         while self.relinearise(&solution) {
             solution = self.solve();
         }
+        self.begin(Stage::Rest);
         // The oldest pose makes room for the new one.
         track.history.rotate_right(1);
         let newest = &mut track.history[0];
@@ -221,9 +229,18 @@ impl<'a> Tracker<'a> {
         Step { solution, measured, neighbour_distance: (nearest / self.query.len() as f64).sqrt() }
     }
 
+    /// Tells the watcher, if there is one, that a stage begins.
+    #[inline]
+    pub fn begin(&self, stage: Stage) {
+        if let Some(watcher) = self.watcher {
+            watcher(stage);
+        }
+    }
+
     /// The most probable pose between prediction and measurement.
     fn solve(&mut self) -> Solution {
         self.set_prior();
+        self.begin(Stage::Map);
         self.solver.solve(
             self.kinematics,
             &mut self.likelihood,
@@ -360,6 +377,7 @@ impl<'a> Tracker<'a> {
         }
         let (window, controls) = self.query.split_at_mut(self.index.width());
         self.index.query_features(&poses[..self.parameters.window], &mut self.features, window);
+        self.index.scale().window_features(&poses[..self.parameters.window], &mut self.recent);
         for ((out, c), f) in controls.iter_mut().zip(&self.controls).zip(&self.control_factors) {
             *out = f64::from(*c) * f;
         }
@@ -376,6 +394,7 @@ impl<'a> Tracker<'a> {
         let controls = Some((self.table, &self.controls[..], &self.control_weights[..]));
         let query =
             Query { features: &self.query_single, controls, exclude: self.exclude, hints: &track.matches };
+        self.begin(Stage::Search);
         self.index.nearest(&query, self.parameters.neighbours, &mut self.search, &mut self.neighbours);
     }
 
@@ -383,7 +402,7 @@ impl<'a> Tracker<'a> {
         let controls =
             self.parameters.control_points_in_query.then_some((self.table, &self.control_factors[..]));
         let examples = self.examples.gather(self.database, self.index, &self.neighbours, controls);
-        let query = regression::Query { inputs: &self.query, recent: &self.features };
+        let query = regression::Query { inputs: &self.query, recent: &self.recent };
         self.predictor.predict(&examples, &query, &self.parameters.regression(), &mut self.prediction);
     }
 

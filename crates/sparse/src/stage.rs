@@ -1,0 +1,16 @@
+/// What a frame is made of, for whoever takes the time: see [`crate::Reconstructor::watched`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// the search for a pose to start from; frames follow on which the candidates are compared
+    Start,
+    /// the query: measurements in the heading frame, window features in principal axes
+    Query,
+    /// the nearest windows
+    Search,
+    /// the prior: neighbours gathered, regression, covariance of its residuals
+    Prior,
+    /// the most probable pose
+    Map,
+    /// what remains: the pose back in the world, its standard deviations
+    Rest,
+}
