@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use posterior::{ControlPoints, GaussianPrior, MapSolver, Measurement, SolverParameters};
 
 use crate::targets::{Move, longest_way, moves};
-use crate::{Contacts, DetectSettings, Error, Feet, FootTracks, POINTS, Result, detect};
+use crate::{Contacts, DetectSettings, Error, Feet, POINTS, Result, detect};
 
 /// How feet are held.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,7 +59,7 @@ pub struct Held {
     pub slide_before_cm_s: Option<f64>,
     /// the same after
     pub slide_after_cm_s: Option<f64>,
-    /// of every frame, after: the fastest standing point, see [`FootTracks::slides_cm_s`]
+    /// of every frame, after: the fastest standing point, see [`crate::FootTracks::slides_cm_s`]
     pub slides_cm_s: Vec<Option<f64>>,
     /// frames that were changed
     pub frames_changed: usize,

@@ -1,136 +1,16 @@
 //! The service as a whole: a real PostgreSQL, a real folder, jobs through the queue, questions through gRPC.
 
+mod fixture;
 mod walker;
 
-use motion_index::{BUILD_MOTION_DATABASE, BuildMotionDatabase, InputFile, MotionDatabaseName};
+use fixture::{Fixture, plan};
 use proto::v1::{self, motion_index_client::MotionIndexClient};
-use queue::{ChildJob, NewRun, ProjectId, RunId, RunState, RunStatus};
-use service::{Config, Running};
-use sqlx::{PgPool, postgres::PgListener};
+use service::Config;
 use std::time::Duration;
-use store::{Location, Store, key};
-use testkit::postgres::TestDatabase;
+use store::Location;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, transport::Channel};
 use uuid::Uuid;
-
-/// A database, a store and a service of one test.
-struct Fixture {
-    database: TestDatabase,
-    pool: PgPool,
-    store: Store,
-    project: Uuid,
-    running: Running,
-    shutdown: CancellationToken,
-    _folder: tempfile::TempDir,
-}
-
-impl Fixture {
-    async fn new() -> Self {
-        let database = TestDatabase::new().await.unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let location = Location::folder(folder.path());
-        let pool = database.pool();
-        let project = Uuid::now_v7();
-        sqlx::query("INSERT INTO projects (id, name) VALUES ($1, 'lab')")
-            .bind(project)
-            .execute(&pool)
-            .await
-            .unwrap();
-        let mut config = Config::new(database.url(), location.clone(), "127.0.0.1:0".parse().unwrap());
-        config.worker.concurrency = 1;
-        let shutdown = CancellationToken::new();
-        let running = motion_index::start(config, shutdown.clone()).await.unwrap();
-        let store = Store::open(&location).unwrap();
-        Self { database, pool, store, project, running, shutdown, _folder: folder }
-    }
-
-    async fn client(&self) -> MotionIndexClient<Channel> {
-        MotionIndexClient::new(self.channel().await)
-    }
-
-    async fn channel(&self) -> Channel {
-        Channel::from_shared(format!("http://{}", self.running.address)).unwrap().connect().await.unwrap()
-    }
-
-    /// A row that waits for its index, as the gateway makes it.
-    async fn new_database(&self, name: &str) -> Uuid {
-        let id = Uuid::now_v7();
-        sqlx::query("INSERT INTO motion_databases (id, project_id, name, version) VALUES ($1, $2, $3, 1)")
-            .bind(id)
-            .bind(self.project)
-            .bind(name)
-            .execute(&self.pool)
-            .await
-            .unwrap();
-        id
-    }
-
-    async fn upload(&self, database: Uuid, name: &str, content: impl Into<Vec<u8>>) -> InputFile {
-        let key = key::motion_database_input(database, Uuid::now_v7());
-        let stored = self.store.put(&key, content.into().into()).await.unwrap();
-        InputFile {
-            name: name.to_owned(),
-            role: "motion".to_owned(),
-            store_key: stored.key.into(),
-            bytes: stored.bytes,
-            blake3: stored.blake3,
-        }
-    }
-
-    async fn build(&self, id: Uuid, files: Vec<InputFile>) -> RunStatus {
-        let name = MotionDatabaseName { id, name: "walks".to_owned(), version: 1 };
-        let payload = serde_json::to_value(BuildMotionDatabase { motion_database: name, files }).unwrap();
-        let mut transaction = self.pool.begin().await.unwrap();
-        let run = NewRun {
-            project_id: ProjectId(self.project),
-            kind: "motion-database",
-            session_id: None,
-            parameters: payload.clone(),
-        };
-        let run = queue::enqueue_run(&mut transaction, &run).await.unwrap();
-        queue::enqueue_many(&mut transaction, run, &[ChildJob::new(BUILD_MOTION_DATABASE, payload)])
-            .await
-            .unwrap();
-        transaction.commit().await.unwrap();
-        finished(&self.pool, run).await
-    }
-
-    async fn build_walks(&self, trials: &[usize]) -> Uuid {
-        let id = self.new_database("walks").await;
-        let mut files = vec![self.upload(id, "7.asf", walker::ASF).await];
-        for trial in trials {
-            files.push(self.upload(id, &format!("7_{trial:02}.amc"), walker::amc(*trial, 240)).await);
-        }
-        let run = self.build(id, files).await;
-        assert_eq!(run.state, RunState::Succeeded, "{:?}", run.error_message);
-        id
-    }
-
-    async fn stop(self) {
-        self.shutdown.cancel();
-        self.running.stopped().await.unwrap();
-        drop(self.database);
-    }
-}
-
-/// The run once it has ended.
-async fn finished(pool: &PgPool, run: RunId) -> RunStatus {
-    let wait = async {
-        let mut changes = PgListener::connect_with(pool).await.unwrap();
-        changes.listen(queue::channels::RUNS).await.unwrap();
-        loop {
-            let mut connection = pool.acquire().await.unwrap();
-            let status = queue::run_status(&mut connection, run).await.unwrap().unwrap();
-            if status.state.is_finished() {
-                return status;
-            }
-            drop(connection);
-            changes.recv().await.unwrap();
-        }
-    };
-    tokio::time::timeout(Duration::from_secs(120), wait).await.expect("the run did not end")
-}
 
 #[tokio::test]
 async fn a_database_is_built_from_uploads_and_answers_questions() {
@@ -153,8 +33,12 @@ async fn a_database_is_built_from_uploads_and_answers_questions() {
     // A window of trial 2 (every other frame of 120 Hz) is found where it is.
     let motion = walker::motion(2, 240);
     let window = [100, 102, 104].map(|frame| proto::poses::to_wire(motion.pose(frame)));
-    let question =
-        v1::NearestWindowsRequest { database_id: id.to_string(), window: window.to_vec(), num_matches: 5 };
+    let question = v1::NearestWindowsRequest {
+        database_id: id.to_string(),
+        window: window.to_vec(),
+        num_matches: 5,
+        shard: None,
+    };
     let found = client.nearest_windows(question.clone()).await.unwrap().into_inner().matches;
     assert_eq!(found.len(), 5);
     let best = found[0].pose.clone().unwrap();
@@ -196,6 +80,7 @@ async fn control_points_find_the_pose_they_come_from_wherever_the_person_stands(
         database_id: id.to_string(),
         control_points: Some(frame),
         num_matches: 3,
+        shard: None,
     };
     let mut client = fixture.client().await;
     let found = client.find_poses_by_control_points(request).await.unwrap().into_inner().matches;
@@ -224,7 +109,7 @@ async fn questions_that_make_no_sense_get_the_right_code() {
         (id.to_string(), windows(17, dofs), 1, Code::InvalidArgument, "17"),
     ];
     for (database_id, window, num_matches, code, message) in cases {
-        let request = v1::NearestWindowsRequest { database_id, window, num_matches };
+        let request = v1::NearestWindowsRequest { database_id, window, num_matches, shard: None };
         let status = client.nearest_windows(request).await.unwrap_err();
         assert_eq!(status.code(), code, "{status}");
         assert!(status.message().contains(message), "{status}");
@@ -239,9 +124,7 @@ async fn a_damaged_upload_fails_the_run_with_the_file_and_line() {
     let damaged = walker::amc(1, 20).replacen("rtibia", "rtibia x", 1);
     let files =
         vec![fixture.upload(id, "7.asf", walker::ASF).await, fixture.upload(id, "7_01.amc", damaged).await];
-    let run = fixture.build(id, files).await;
-    assert_eq!(run.state, RunState::Failed);
-    let message = run.error_message.unwrap();
+    let message = fixture.fail_to_build(&plan(id, files)).await;
     assert!(message.contains("7_01.amc") && message.contains("line"), "{message}");
     fixture.stop().await;
 }
@@ -254,9 +137,7 @@ async fn a_database_that_was_deleted_meanwhile_fails_the_run() {
         fixture.upload(id, "7.asf", walker::ASF).await,
         fixture.upload(id, "7_01.amc", walker::amc(1, 60)).await,
     ];
-    let run = fixture.build(id, files).await;
-    assert_eq!(run.state, RunState::Failed);
-    assert!(run.error_message.unwrap().contains("deleted"));
+    assert!(fixture.fail_to_build(&plan(id, files)).await.contains("deleted"));
     fixture.stop().await;
 }
 
@@ -270,7 +151,7 @@ async fn health_and_reflection_are_served() {
         server_reflection_request::MessageRequest, server_reflection_response::MessageResponse,
     };
     let fixture = Fixture::new().await;
-    let mut health = HealthClient::new(fixture.channel().await);
+    let mut health = HealthClient::new(fixture.channel_of(0).await);
     for service in ["", "marey.v1.MotionIndex"] {
         let mut watch =
             health.watch(HealthCheckRequest { service: service.to_owned() }).await.unwrap().into_inner();
@@ -278,7 +159,7 @@ async fn health_and_reflection_are_served() {
             async { while watch.message().await.unwrap().unwrap().status() != ServingStatus::Serving {} };
         tokio::time::timeout(Duration::from_secs(30), serving).await.expect("never became ready");
     }
-    let mut reflection = ServerReflectionClient::new(fixture.channel().await);
+    let mut reflection = ServerReflectionClient::new(fixture.channel_of(0).await);
     let request = ServerReflectionRequest {
         host: String::new(),
         message_request: Some(MessageRequest::ListServices(String::new())),

@@ -1,8 +1,8 @@
 //! The files that people get.
 
+use crate::feet::Finished;
 use kinematics::{Kinematics, Parametrisation};
 use model::Motion;
-use sparse::{FrameQuality, Merged};
 use std::fmt::Write as _;
 
 /// A result's name, its media type, and how it is written.
@@ -12,7 +12,7 @@ pub(crate) struct Export {
     /// Its media type.
     pub media_type: &'static str,
     /// Makes the content.
-    pub write: fn(&Merged) -> String,
+    pub write: fn(&Finished) -> String,
 }
 
 const TEXT: &str = "text/plain; charset=utf-8";
@@ -20,12 +20,16 @@ const CSV: &str = "text/csv; charset=utf-8";
 
 /// All of them, made one after the other so that only one is in memory at a time.
 pub(crate) const EXPORTS: [Export; 6] = [
-    Export { name: "motion.bvh", media_type: TEXT, write: |m| formats::bvh::write(&m.motion) },
-    Export { name: "motion.amc", media_type: TEXT, write: |m| formats::amc::write(&m.motion) },
-    Export { name: "skeleton.asf", media_type: TEXT, write: |m| formats::asf::write(m.motion.skeleton()) },
-    Export { name: "poses.csv", media_type: CSV, write: |m| formats::motion_csv::write(&m.motion) },
-    Export { name: "positions.csv", media_type: CSV, write: |m| positions(&m.motion) },
-    Export { name: "quality.csv", media_type: CSV, write: |m| quality(&m.quality, m.motion.frame_rate()) },
+    Export { name: "motion.bvh", media_type: TEXT, write: |m| formats::bvh::write(&m.merged.motion) },
+    Export { name: "motion.amc", media_type: TEXT, write: |m| formats::amc::write(&m.merged.motion) },
+    Export {
+        name: "skeleton.asf",
+        media_type: TEXT,
+        write: |m| formats::asf::write(m.merged.motion.skeleton()),
+    },
+    Export { name: "poses.csv", media_type: CSV, write: |m| formats::motion_csv::write(&m.merged.motion) },
+    Export { name: "positions.csv", media_type: CSV, write: |m| positions(&m.merged.motion) },
+    Export { name: "quality.csv", media_type: CSV, write: quality },
 ];
 
 /// Positions of all joints: `frame,time,root_x,root_y,root_z,…`; seconds and metres, y up.
@@ -61,16 +65,24 @@ fn quoted(name: &str) -> String {
     }
 }
 
-/// How well each frame is known.
-fn quality(quality: &[FrameQuality], frame_rate: f64) -> String {
-    let mut out =
-        String::from("frame,time,measured_points,residual_m,sigma_rad,energy,neighbour_distance_deg\n");
-    for (frame, q) in quality.iter().enumerate() {
+/// How well each frame is known, and what its feet do (empty where feet were not looked for).
+fn quality(finished: &Finished) -> String {
+    let frame_rate = finished.merged.motion.frame_rate();
+    let mut out = String::from(
+        "frame,time,measured_points,residual_m,sigma_rad,energy,neighbour_distance_deg,left_foot_contact,\
+         right_foot_contact,foot_slide_cm_s\n",
+    );
+    for (frame, q) in finished.merged.quality.iter().enumerate() {
         // Where nothing was measured there is no residual, not one of 0.
         let residual = if q.measured_points > 0 { format!("{:.7}", q.residual_m) } else { String::new() };
+        let feet = finished.feet.as_ref().map_or(",,".to_owned(), |feet| {
+            let [left, right] = feet.stand[frame].map(u8::from);
+            let slide = feet.slides_cm_s[frame].map_or(String::new(), |slide| format!("{slide:.3}"));
+            format!("{left},{right},{slide}")
+        });
         let _ = writeln!(
             out,
-            "{frame},{:.6},{},{residual},{:.7},{:.6},{:.6}",
+            "{frame},{:.6},{},{residual},{:.7},{:.6},{:.6},{feet}",
             frame as f64 / frame_rate,
             q.measured_points,
             q.sigma_rad,
@@ -85,6 +97,7 @@ fn quality(quality: &[FrameQuality], frame_rate: f64) -> String {
 mod tests {
     use super::*;
     use model::{Axis, Channel, Joint, Skeleton};
+    use sparse::{FrameQuality, Merged};
 
     fn motion(name: &str) -> Motion {
         let root = Joint::root(name, vec![Channel::translation(Axis::X), Channel::rotation(Axis::X)]);
@@ -118,7 +131,8 @@ mod tests {
             neighbour_distance_deg: 2.0,
             measured_points: 6,
         };
-        let text = quality(&[q], 60.0);
-        assert_eq!(text.lines().nth(1), Some("0,0.000000,6,0.0010000,0.0500000,1.500000,2.000000"));
+        let merged = Merged { motion: motion("root"), quality: vec![q] };
+        let text = quality(&Finished { merged, feet: None });
+        assert_eq!(text.lines().nth(1), Some("0,0.000000,6,0.0010000,0.0500000,1.500000,2.000000,,,"));
     }
 }

@@ -60,6 +60,8 @@ pub(crate) struct Evidence {
     pub session: Session,
     /// What was sloppy, each with the file's name.
     pub warnings: Vec<String>,
+    /// Whether a file had the skeleton; otherwise it is the fallback.
+    pub has_skeleton: bool,
 }
 
 /// Reads a session's files. `fallback`: the skeleton when none of them is one.
@@ -72,12 +74,10 @@ pub(crate) fn read(
     fallback: &Arc<Skeleton>,
 ) -> Result<Evidence, InputError> {
     let mut warnings = Vec::new();
-    let skeleton = match at_most_one(files, "skeleton")? {
+    let own = at_most_one(files, "skeleton")?;
+    let skeleton = match own {
         Some(file) => read_skeleton(file, selection.reading, &mut warnings)?.skeleton,
-        None => {
-            warnings.push("no skeleton file: the motion database's own skeleton is used".to_owned());
-            fallback.clone()
-        }
+        None => fallback.clone(),
     };
     let file = at_most_one(files, "control-points")?.ok_or_else(|| InputError::Count {
         role: "control-points",
@@ -99,7 +99,7 @@ pub(crate) fn read(
             );
         }
     }
-    Ok(Evidence { session, warnings })
+    Ok(Evidence { session, warnings, has_skeleton: own.is_some() })
 }
 
 /// The motion that really was, if a file has it; `seconds`: how long the session is, from which the frame rate of an AMC

@@ -14,10 +14,12 @@ mod chunk_job;
 mod error;
 mod evaluate;
 mod export;
+mod feet;
 mod inputs;
 mod live;
 mod merge_job;
 mod payload;
+mod performer;
 mod plan_job;
 mod priors;
 mod rpc;
@@ -25,6 +27,7 @@ mod run_report;
 
 pub use error::InputError;
 pub use payload::{InputFile, MergeChunks, MotionDatabaseFile, Object, PlanSparse, ReconstructChunk};
+pub use performer::FittedReport;
 
 use priors::Priors;
 use proto::v1::{live_server::LiveServer, reconstruction_server::ReconstructionServer};

@@ -5,6 +5,7 @@ use crate::{
     error::InputError,
     evaluate,
     export::EXPORTS,
+    feet::{self, Finished},
     payload::{JobReport, MergeChunks},
     plan_job,
     run_report::{RUN, RunReport},
@@ -12,7 +13,7 @@ use crate::{
 use bytes::Bytes;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
-use sparse::{Merged, Reconstruction, Session};
+use sparse::{Reconstruction, Session};
 use std::{sync::Arc, time::Instant};
 use store::Store;
 
@@ -37,17 +38,17 @@ impl Handler for MergeHandler {
         objects::clean_up_earlier_attempts(store, &job).await;
         let payload: MergeChunks = job.payload()?;
         job.progress(0.0, "putting the parts together");
-        let (merged, chunks) = self.merge(&job, &payload).await?;
-        let mut results = self.export(&job, &merged).await?;
+        let (finished, chunks) = self.merge(&job, &payload).await?;
+        let mut results = self.export(&job, &finished).await?;
         job.progress(0.9, "comparing with the ground truth");
-        results.extend(self.evaluate(&job, &payload, &merged).await?);
+        results.extend(self.evaluate(&job, &payload, &finished).await?);
         let merge = JobReport {
             worker: worker_name.clone(),
             attempt: job.attempt(),
             seconds: started.elapsed().as_secs_f64(),
-            frames: merged.quality.len(),
+            frames: finished.merged.quality.len(),
         };
-        let report = RunReport::new(job.run_id().0, &payload, &merged.quality, &chunks, &merge);
+        let report = RunReport::new(job.run_id().0, &payload, &finished, &chunks, &merge);
         let report = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
         results.push(objects::write_result(store, &job, RUN, "application/json", report).await?);
         Ok(results.into_iter().fold(Outcome::default(), Outcome::artefact))
@@ -60,7 +61,7 @@ impl MergeHandler {
         &self,
         job: &JobContext,
         payload: &MergeChunks,
-    ) -> Result<(Arc<Merged>, Vec<JobReport>), JobError> {
+    ) -> Result<(Arc<Finished>, Vec<JobReport>), JobError> {
         let Shared { store, pool, priors, memory, .. } = &*self.shared;
         let limit = memory.max_object_bytes;
         let mut connection = pool.acquire().await?;
@@ -86,23 +87,28 @@ impl MergeHandler {
         let session = objects::read(store, session, limit).await?;
         let database = priors.database(&payload.request.motion_database).await?;
         let parameters = payload.request.parameters.clone();
-        let merged = compute::run(move || -> Result<Merged, InputError> {
+        let finished = compute::run(move || -> Result<Finished, InputError> {
             let session = Session::from_bytes(&session)?;
             let parts: Result<Vec<_>, _> =
                 parts.iter().map(|part| Reconstruction::from_bytes(part)).collect();
-            Ok(sparse::merge(&database, &session, &parameters, &parts?)?)
+            let merged = sparse::merge(&database, &session, &parameters, &parts?)?;
+            Ok(if parameters.foot_contacts {
+                feet::hold(&database, &session, merged)
+            } else {
+                Finished { merged, feet: None }
+            })
         });
-        Ok((Arc::new(merged.await?), reports))
+        Ok((Arc::new(finished.await?), reports))
     }
 
     /// Writes the motion in every format.
-    async fn export(&self, job: &JobContext, merged: &Arc<Merged>) -> Result<Vec<Artefact>, JobError> {
+    async fn export(&self, job: &JobContext, finished: &Arc<Finished>) -> Result<Vec<Artefact>, JobError> {
         let mut results = Vec::new();
         for (done, export) in EXPORTS.iter().enumerate() {
             job.check()?;
             job.progress(0.3 + 0.6 * done as f64 / EXPORTS.len() as f64, format!("writing {}", export.name));
-            let merged = merged.clone();
-            let content = compute::run(move || (export.write)(&merged)).await;
+            let finished = finished.clone();
+            let content = compute::run(move || (export.write)(&finished)).await;
             results.push(
                 objects::write_result(&self.shared.store, job, export.name, export.media_type, content)
                     .await?,
@@ -116,7 +122,7 @@ impl MergeHandler {
         &self,
         job: &JobContext,
         payload: &MergeChunks,
-        merged: &Arc<Merged>,
+        finished: &Arc<Finished>,
     ) -> Result<Option<Artefact>, JobError> {
         let Shared { store, priors, memory, .. } = &*self.shared;
         let files = &payload.request.files;
@@ -126,10 +132,11 @@ impl MergeHandler {
         let wanted: Vec<_> = files.iter().filter(|f| f.role != "control-points").cloned().collect();
         let fetched = plan_job::fetch(store, &wanted, memory.max_object_bytes).await?;
         let database = priors.database(&payload.request.motion_database).await?;
-        let merged = merged.clone();
+        let finished = finished.clone();
         let reading = payload.request.reading();
         let errors =
-            compute::run(move || evaluate::errors(&fetched, &database, &merged.motion, reading)).await?;
+            compute::run(move || evaluate::errors(&fetched, &database, &finished.merged.motion, reading))
+                .await?;
         let Some(errors) = errors else { return Ok(None) };
         let json = serde_json::to_vec_pretty(&errors).map_err(JobError::retry)?;
         Ok(Some(objects::write_result(store, job, evaluate::EVALUATION, "application/json", json).await?))

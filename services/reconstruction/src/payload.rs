@@ -1,5 +1,6 @@
 //! What the jobs of this service are given. Everything that decides the result is in here.
 
+use crate::performer::FittedReport;
 use formats::{BvhOptions, PointsOptions};
 use model::Axis;
 pub use payloads::{InputFile, MotionDatabaseFile, Object};
@@ -89,6 +90,9 @@ pub struct MergeChunks {
     pub points: Vec<String>,
     /// What was sloppy about the files.
     pub warnings: Vec<String>,
+    /// The skeleton that was fitted, if the session came without one.
+    #[serde(default)]
+    pub fitted: Option<FittedReport>,
     /// What the plan itself took.
     pub plan: JobReport,
 }

@@ -5,8 +5,10 @@ use crate::{
     error::InputError,
     inputs::{self, Evidence, NamedBytes},
     payload::{InputFile, JobReport, MergeChunks, Object, PlanSparse, ReconstructChunk},
+    performer::{self, FittedReport},
 };
 use model::Skeleton;
+use motion_db::MotionDatabase;
 use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use sparse::{Reconstructor, plan_chunks};
@@ -47,7 +49,7 @@ impl Handler for PlanHandler {
         job.check()?;
 
         let (limit, asked) = (memory.max_session_frames, request.clone());
-        let (evidence, bytes) = compute::run(move || -> Result<(Evidence, Vec<u8>), InputError> {
+        let (evidence, fitted, bytes) = compute::run(move || -> Result<_, InputError> {
             let selection = inputs::Selection {
                 points: &asked.points,
                 mapping: &asked.mapping,
@@ -61,10 +63,11 @@ impl Handler for PlanHandler {
             if frames > limit {
                 return Err(InputError::TooLong { frames, limit });
             }
+            let fitted = give_skeleton(&prior.database, &mut evidence, asked.parameters.fit_skeleton)?;
             // What does not fit the database is said now, not by every chunk.
             Reconstructor::new(&prior.database, &prior.index, &evidence.session, &asked.parameters)?;
             let bytes = evidence.session.to_bytes();
-            Ok((evidence, bytes))
+            Ok((evidence, fitted, bytes))
         })
         .await?;
         job.check()?;
@@ -77,8 +80,28 @@ impl Handler for PlanHandler {
             seconds: started.elapsed().as_secs_f64(),
             frames: evidence.session.num_frames(),
         };
-        Ok(Outcome::default().artefact(artefact).children(children(request, session, evidence, report)?))
+        Ok(Outcome::default()
+            .artefact(artefact)
+            .children(children(request, session, evidence, fitted, report)?))
     }
+}
+
+/// Sees to a session that came without a skeleton: it is given one that fits, or keeps the database's.
+fn give_skeleton(
+    database: &MotionDatabase,
+    evidence: &mut Evidence,
+    is_fitted: bool,
+) -> Result<Option<FittedReport>, InputError> {
+    if evidence.has_skeleton {
+        return Ok(None);
+    }
+    if !is_fitted {
+        evidence.warnings.push("no skeleton file: the motion database's own skeleton is used".to_owned());
+        return Ok(None);
+    }
+    let (session, fitted) = performer::fit(database, evidence.session.clone(), &mut evidence.warnings)?;
+    evidence.session = session;
+    Ok(fitted)
 }
 
 /// Whether a skeleton comes from the sample motion, which names its skeletons so.
@@ -107,6 +130,7 @@ fn children(
     request: PlanSparse,
     session: Object,
     evidence: Evidence,
+    fitted: Option<FittedReport>,
     plan: JobReport,
 ) -> Result<Vec<ChildJob>, JobError> {
     let num_frames = evidence.session.num_frames();
@@ -128,7 +152,7 @@ fn children(
         jobs.push(ChildJob::new(RECONSTRUCT_CHUNK, payload).weight(weight).max_attempts(CHUNK_ATTEMPTS));
     }
     let points = evidence.session.points.iter().map(|p| p.name.clone()).collect();
-    let merge = MergeChunks { request, session, points, warnings: evidence.warnings, plan };
+    let merge = MergeChunks { request, session, points, warnings: evidence.warnings, fitted, plan };
     let merge = serde_json::to_value(merge).map_err(JobError::retry)?;
     let weight = num_frames as f64 / FRAMES_PER_WEIGHT / MERGE_SPEED;
     jobs.push(ChildJob::new(MERGE_CHUNKS, merge).weight(weight).depends_on(0..num_chunks));

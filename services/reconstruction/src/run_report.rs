@@ -1,6 +1,8 @@
 //! `run.json`: all that decided the result, and what it took.
 
+use crate::feet::{Finished, FootReport};
 use crate::payload::{JobReport, MergeChunks, MotionDatabaseFile};
+use crate::performer::FittedReport;
 use serde::Serialize;
 use sparse::{FrameQuality, Parameters};
 use std::collections::BTreeMap;
@@ -19,7 +21,11 @@ pub(crate) struct RunReport<'a> {
     parameters: &'a Parameters,
     /// Nothing in this method is drawn at random.
     seeds: [u64; 0],
+    /// The skeleton that was fitted, if the session came without one.
+    fitted_skeleton: Option<&'a FittedReport>,
     quality: Summary,
+    /// Feet, where they were looked for and found.
+    feet: Option<&'a FootReport>,
     warnings: &'a [String],
     timings: Timings<'a>,
 }
@@ -72,7 +78,7 @@ impl<'a> RunReport<'a> {
     pub fn new(
         run_id: Uuid,
         job: &'a MergeChunks,
-        quality: &[FrameQuality],
+        finished: &'a Finished,
         chunks: &'a [JobReport],
         merge: &'a JobReport,
     ) -> Self {
@@ -92,7 +98,7 @@ impl<'a> RunReport<'a> {
             session: SessionReport {
                 id: request.session_id,
                 name: &request.session_name,
-                frames: quality.len(),
+                frames: finished.merged.quality.len(),
                 frame_rate_hz: motion_db::FRAME_RATE,
                 points: &job.points,
                 mapping: &request.mapping,
@@ -101,7 +107,9 @@ impl<'a> RunReport<'a> {
             motion_database: &request.motion_database,
             parameters: &request.parameters,
             seeds: [],
-            quality: summary(quality),
+            fitted_skeleton: job.fitted.as_ref(),
+            quality: summary(&finished.merged.quality),
+            feet: finished.feet.as_ref().map(|feet| &feet.report),
             warnings: &job.warnings,
             timings: Timings {
                 plan: &job.plan,

@@ -273,6 +273,12 @@ async fn a_session_comes_back_as_motion_files_near_the_truth() {
     let amc = fixture.text(&results["motion.amc"]).await;
     assert_eq!(formats::amc::read(amc.as_bytes(), &asf, 60.0).unwrap().value.num_frames(), 300);
     assert_eq!(fixture.text(&results["quality.csv"]).await.lines().count(), 301);
+    assert!(report["fitted_skeleton"].is_null(), "{report}");
+    let feet = &report["feet"];
+    if feet["contacts"].as_u64().unwrap() > 0 {
+        let [before, after] = ["slide_before_cm_s", "slide_after_cm_s"].map(|name| feet[name].as_f64());
+        assert!(after <= before, "{feet}");
+    }
     service.stop().await;
 }
 
@@ -320,6 +326,10 @@ async fn a_marker_file_is_read_through_the_mapping() {
     let report: Value = serde_json::from_str(&fixture.text(&results["run.json"]).await).unwrap();
     assert_eq!(report["session"]["points"], serde_json::json!(["left_wrist", "right_ankle", "head"]));
     assert!(report["warnings"][0].as_str().unwrap().contains("no skeleton file"), "{}", report["warnings"]);
+    assert!(report["fitted_skeleton"]["sizes"]["height_m"].as_f64().unwrap() > 0.5, "{report}");
+    let asf = formats::asf::read(fixture.text(&results["skeleton.asf"]).await.as_bytes()).unwrap().value;
+    let height = skeleton_fit::Sizes::of(&asf.skeleton).height_m;
+    assert!((height - report["fitted_skeleton"]["sizes"]["height_m"].as_f64().unwrap()).abs() < 1e-3);
     assert!(!results.contains_key("evaluation.json"));
     service.stop().await;
 }

@@ -1,5 +1,6 @@
 //! `marey bench`: how fast the parts are, on motion of your own.
 
+mod reconstruct;
 mod search;
 
 /// `marey bench`
@@ -11,6 +12,7 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum What {
+    Reconstruct(Box<reconstruct::Args>),
     /// Search windows of held-out motion in a database: exact beside fast
     Search(Box<search::Args>),
 }
@@ -18,6 +20,7 @@ enum What {
 /// Runs `marey bench`.
 pub fn run(args: Args) -> anyhow::Result<()> {
     match args.what {
+        What::Reconstruct(args) => reconstruct::run(&args),
         What::Search(args) => search::run(&args),
     }
 }
