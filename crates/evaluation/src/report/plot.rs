@@ -181,7 +181,7 @@ impl BarPlot<'_> {
         if self.bars.is_empty() {
             return String::new();
         }
-        let x = |v: f64| NAMES + v / top * (WIDTH - NAMES - 90.0);
+        let x = |v: f64| NAMES + v / top * (WIDTH - NAMES - 45.0 - 32.0 * self.series.len() as f64);
         let height = ROW * self.bars.len() as f64 + 24.0;
         let mut out = format!(
             "<figure>\n{}<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{}\">\n",
