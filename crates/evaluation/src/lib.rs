@@ -1,16 +1,40 @@
 //! How far a reconstruction is from the truth, and the protocols under which that is asked (method §2).
 //!
-//! - [`Errors`]: all metrics of one trial, always together.
-//! - [`evaluate_sparse`]: trials reconstructed from their own control points, by protocol, into [`Row`]s.
-//! - [`table`]: rows as text.
+//! - [`compare`], [`compare_in_detail`]: all metrics of one trial, always together; by frame and by joint.
+//! - [`foot_slide`], [`Calibration`]: whether standing feet stand, and whether errors are as large as stated.
+//! - [`evaluate_sparse`]: trials reconstructed from their own control points, by [`Protocol`], in every case of a [`Sweep`]:
+//!   methods, windows, sizes of the database, noise, gaps.
+//! - [`summarise`] into [`Row`]s, [`tables`] of them beside the papers' own, and HTML reports ([`report`]).
 
+mod body;
+mod calibration;
+mod case;
+mod disturbance;
+mod error;
+mod feet;
+mod gap;
 mod metrics;
+mod models;
+mod protocol;
+pub mod report;
 mod sparse_protocol;
+mod subset;
 mod summary;
+pub mod tables;
+mod truth;
 
-pub use metrics::{Errors, compare};
-pub use sparse_protocol::{
-    ControlSet, Error, Protocol, SparseEvaluation, TrialResult, at_database_rate, control_trajectories,
-    evaluate_sparse,
+pub use body::{
+    FeetResult, FootNumbers, SkeletonResult, SkeletonSource, SkeletonTrial, evaluate_feet, evaluate_skeletons,
 };
-pub use summary::{Row, summarise, table};
+pub use calibration::{Calibration, Count, DofGroup, WITHIN_ONE, WITHIN_TWO};
+pub use case::{Case, Sweep, Variant};
+pub use disturbance::{Gap, Hidden, Occlusion, disturbed};
+pub use error::Error;
+pub use feet::{ContactThresholds, FootPaths, FootSlide, foot_slide};
+pub use gap::{GapErrors, gap_errors};
+pub use metrics::{Comparison, Errors, JointErrors, compare, compare_in_detail};
+pub use protocol::{ControlSet, Protocol};
+pub use sparse_protocol::{SparseEvaluation, TrialResult, evaluate_sparse};
+pub use subset::{first_clips, poses_at_60, shuffle_by_name};
+pub use summary::{ALL, GapSummary, Row, summarise};
+pub use truth::{at_60_hz, at_database_rate, control_trajectories};

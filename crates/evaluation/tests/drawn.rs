@@ -1,6 +1,10 @@
 //! The protocols on drawn motion.
 
-use evaluation::{ControlSet, Error, Protocol, SparseEvaluation, compare, evaluate_sparse, summarise, table};
+use std::sync::Mutex;
+
+use evaluation::{
+    ControlSet, Error, Protocol, SparseEvaluation, Sweep, compare, evaluate_sparse, summarise, tables::table,
+};
 use model::Motion;
 use motion_db::Clip;
 use sample_motion::{Action, DrawOptions, Model};
@@ -22,14 +26,16 @@ fn evaluate(protocol: Protocol, points: &[usize], methods: &[Method]) -> Vec<eva
         train: &clips,
         test: &clips[..3],
         protocol,
-        points,
-        methods,
-        parameters: Parameters::default(),
+        sweep: Sweep::new(methods, points, Parameters::default()),
         max_frames: 60,
+        threads: 2,
     };
-    let mut seen = Vec::new();
-    let results = evaluate_sparse(&evaluation, &|| 0.0, &mut |done, all| seen.push((done, all))).unwrap();
-    assert_eq!(seen, (0..results.len()).map(|i| (i, results.len())).collect::<Vec<_>>());
+    let seen = Mutex::new(Vec::new());
+    let progress = |done, all| seen.lock().unwrap().push((done, all));
+    let results = evaluate_sparse(&evaluation, &|| 0.0, &progress).unwrap();
+    let mut seen = seen.into_inner().unwrap();
+    seen.sort_unstable();
+    assert_eq!(seen, (1..=results.len()).map(|i| (i, results.len())).collect::<Vec<_>>());
     results
 }
 
@@ -41,18 +47,19 @@ fn every_trial_is_evaluated_under_every_method_and_number_of_points() {
     for points in [4, 6] {
         for method in both {
             let of_case: Vec<_> =
-                results.iter().filter(|r| r.points == points && r.method == method).collect();
+                results.iter().filter(|r| r.case.points == points && r.case.method == method).collect();
             let names: Vec<_> = of_case.iter().map(|r| r.trial.as_str()).collect();
             assert_eq!(names, ["0_0", "0_1", "0_2"]);
             for r in of_case {
-                assert_eq!(r.errors.frames, 60);
+                let errors = r.comparison.errors;
+                assert_eq!(errors.frames, 60);
                 // Nothing of the trial itself was used: no error would be a sign that it was.
-                assert!(r.errors.rms_deg > 0.5 && r.errors.rms_deg < 40.0, "{r:?}");
-                assert!(r.errors.mae_deg <= r.errors.rms_deg && r.errors.mpjpe_cm < 10.0, "{r:?}");
+                assert!(errors.rms_deg > 0.5 && errors.rms_deg < 40.0, "{errors:?}");
+                assert!(errors.mae_deg <= errors.rms_deg && errors.mpjpe_cm < 10.0, "{errors:?}");
             }
         }
     }
-    let rows = summarise(&results, Protocol::TrialOut, &Parameters::default());
+    let rows = summarise(&results, Protocol::TrialOut);
     // walk, run and all, of each method and number of points.
     assert_eq!(rows.len(), 2 * 2 * 3);
     assert!(rows.iter().filter(|r| r.action == "all").all(|r| r.trials == 3 && r.frames == 180));
@@ -70,12 +77,11 @@ fn without_the_subject_not_even_a_copy_is_found() {
             train: &clips,
             test: &clips[..1],
             protocol,
-            points: &[6],
-            methods: &[Method::LocalRegression],
-            parameters: Parameters::default(),
+            sweep: Sweep::new(&[Method::LocalRegression], &[6], Parameters::default()),
             max_frames: 60,
+            threads: 1,
         };
-        evaluate_sparse(&evaluation, &|| 0.0, &mut |_, _| {}).unwrap()[0].errors.rms_deg
+        evaluate_sparse(&evaluation, &|| 0.0, &|_, _| {}).unwrap()[0].comparison.errors.rms_deg
     };
     let (with_copy, without) = (error(Protocol::TrialOut), error(Protocol::SubjectOut));
     assert!(with_copy < 1.0 && without > 3.0, "{with_copy} and {without} degrees");
@@ -91,12 +97,11 @@ fn sets_of_points_are_the_papers() {
         train: &clips,
         test: &clips[..1],
         protocol: Protocol::TrialOut,
-        points: &[7],
-        methods: &[Method::Nearest],
-        parameters: Parameters::default(),
+        sweep: Sweep::new(&[Method::Nearest], &[7], Parameters::default()),
         max_frames: 60,
+        threads: 1,
     };
-    let error = evaluate_sparse(&evaluation, &|| 0.0, &mut |_, _| {}).unwrap_err();
+    let error = evaluate_sparse(&evaluation, &|| 0.0, &|_, _| {}).unwrap_err();
     assert_eq!(error, Error::Points { found: 7 });
 }
 

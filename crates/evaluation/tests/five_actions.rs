@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use evaluation::{Protocol, SparseEvaluation, TrialResult, evaluate_sparse};
+use evaluation::{Protocol, SparseEvaluation, Sweep, TrialResult, evaluate_sparse};
 use motion_db::Clip;
 use sparse::{Method, Parameters};
 
@@ -25,14 +25,15 @@ struct Means {
 
 /// Means over the trials of one method and number of points, and their table.
 fn means(results: &[TrialResult], method: Method, points: usize) -> Means {
-    let of_case: Vec<_> = results.iter().filter(|r| r.method == method && r.points == points).collect();
+    let of_case: Vec<_> =
+        results.iter().filter(|r| r.case.method == method && r.case.points == points).collect();
     let mean = |value: &dyn Fn(&TrialResult) -> f64| {
         of_case.iter().map(|r| value(r)).sum::<f64>() / of_case.len() as f64
     };
     let found = Means {
-        rms_deg: mean(&|r| r.errors.rms_deg),
-        mae_deg: mean(&|r| r.errors.mae_deg),
-        mpjpe_cm: mean(&|r| r.errors.mpjpe_cm),
+        rms_deg: mean(&|r| r.comparison.errors.rms_deg),
+        mae_deg: mean(&|r| r.comparison.errors.mae_deg),
+        mpjpe_cm: mean(&|r| r.comparison.errors.mpjpe_cm),
     };
     let Means { rms_deg, mae_deg, mpjpe_cm } = found;
     println!("{method}, {points} points: RMS {rms_deg:.3}, MAE {mae_deg:.3} degrees, {mpjpe_cm:.3} cm");
@@ -50,12 +51,11 @@ fn evaluate(clips: &[Clip], protocol: Protocol, points: &[usize], methods: &[Met
         train: clips,
         test: &test,
         protocol,
-        points,
-        methods,
-        parameters: Parameters::default(),
+        sweep: Sweep::new(methods, points, Parameters::default()),
         max_frames: 120,
+        threads: 2,
     };
-    evaluate_sparse(&evaluation, &|| 0.0, &mut |_, _| {}).unwrap()
+    evaluate_sparse(&evaluation, &|| 0.0, &|_, _| {}).unwrap()
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::database::{FRAME_RATE, proportions};
 use crate::{ClipInfo, Error, MotionDatabase, Result};
 
 /// Shortest clip that is kept, frames at 60 a second.
-const MIN_FRAMES: usize = 8;
+pub(crate) const MIN_FRAMES: usize = 8;
 /// Largest number of poses in one database (bounds memory before it is taken: 250 bytes a pose).
 pub(crate) const MAX_POSES: usize = 8_000_000;
 

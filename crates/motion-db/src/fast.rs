@@ -17,8 +17,9 @@ struct Effort {
 const GLOBAL: Effort = Effort { lists: 96, segments: 500 };
 /// Starting from the last matches.
 const TRACKING: Effort = Effort { lists: 20, segments: 320 };
-/// For a query that is like nothing in the database: its neighbours are far away and spread out.
-const STRANGE: Effort = Effort { lists: 256, segments: 1_000 };
+/// The same for a query that is like nothing in the database: its neighbours are far away and spread out.
+const STRANGE_GLOBAL: Effort = Effort { lists: 256, segments: 1_000 };
+const STRANGE_TRACKING: Effort = Effort { lists: 128, segments: 700 };
 /// Neighbours for which that much is looked at; for more, in proportion more segments.
 const NEIGHBOURS: usize = 64;
 /// A query whose tail is so many times the energy of a segment's is like nothing in the database: the leading features
@@ -34,7 +35,7 @@ const LOST_PART: usize = 2;
 pub enum Way {
     /// along the graph from the hints
     Tracked,
-    /// by the lists alone: there were no hints, the query is like nothing in the database, or the graph had lost the way
+    /// by the lists alone: there were no hints, or the graph had lost the way
     Global,
     /// by looking at every window, because there are few
     Exact,
@@ -201,11 +202,13 @@ impl WindowIndex {
         let energy: f32 = query.features.iter().skip(lead.len()).map(|v| v * v).sum();
         let is_strange = energy > STRANGE_ENERGY * segments.mean_energy;
         let ask = Ask { query, segments, lead, is_strange };
-        if !query.hints.is_empty() && !is_strange {
+        let (global, tracking) =
+            if is_strange { (STRANGE_GLOBAL, STRANGE_TRACKING) } else { (GLOBAL, TRACKING) };
+        if !query.hints.is_empty() {
             scratch.fast.start(segments.len());
             ask.add_along_graph(&mut scratch.fast);
-            ask.add_nearest_lists(TRACKING.lists, &mut scratch.fast);
-            self.look_into(&ask, k, TRACKING.segments, scratch, out);
+            ask.add_nearest_lists(tracking.lists, &mut scratch.fast);
+            self.look_into(&ask, k, tracking.segments, scratch, out);
             let age = scratch.fast.age;
             let is_on_the_way =
                 |n: &&Neighbour| segments.of_row(n.row).is_some_and(|s| scratch.fast.seen[s] == age);
@@ -214,9 +217,8 @@ impl WindowIndex {
             }
         }
         scratch.fast.start(segments.len());
-        let effort = if is_strange { STRANGE } else { GLOBAL };
-        ask.add_nearest_lists(effort.lists, &mut scratch.fast);
-        self.look_into(&ask, k, effort.segments, scratch, out);
+        ask.add_nearest_lists(global.lists, &mut scratch.fast);
+        self.look_into(&ask, k, global.segments, scratch, out);
         Way::Global
     }
 

@@ -1,7 +1,7 @@
 //! Databases made of parts: clips that were read by different jobs, or lie in different shards, in the same coordinates.
 
-use crate::build::structure_mismatch;
-use crate::{Clip, Error, MotionDatabase, Result};
+use crate::build::{MIN_FRAMES, structure_mismatch};
+use crate::{Clip, ClipInfo, Error, MotionDatabase, Result};
 
 impl MotionDatabase {
     /// A database in the coordinates of this one (skeleton, references, leg length) that holds no clip yet.
@@ -46,6 +46,23 @@ impl MotionDatabase {
         info.name = name.to_owned();
         self.clips.push(info);
         Ok(())
+    }
+
+    /// This database without some of its clips, in the same coordinates. Zero poses are learned anew: nothing in it knows of
+    /// what was left out.
+    ///
+    /// # Errors
+    /// [`Error::NoMotion`] if no clip is left.
+    pub fn without(&self, is_left_out: impl Fn(&ClipInfo) -> bool) -> Result<Self> {
+        let mut rest = self.emptied();
+        for (c, info) in self.clips.iter().enumerate().filter(|(_, info)| !is_left_out(info)) {
+            rest.append_from(self, c, &info.name)?;
+        }
+        if rest.clips.is_empty() {
+            return Err(Error::NoMotion { min_frames: MIN_FRAMES });
+        }
+        rest.learn_zero_poses();
+        Ok(rest)
     }
 
     /// Whether the same numbers mean the same pose in both.

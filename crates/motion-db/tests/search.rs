@@ -1,53 +1,14 @@
-//! The fast search finds what looking at every row finds.
+//! The exact search finds what looking at every row finds.
 
 mod fixtures;
 
 use std::ops::Range;
 
-use fixtures::{Numbers, drawn, drawn_clips, recorded};
+use fixtures::{Numbers, Question, SIX, drawn, drawn_clips, questions, recorded};
 use kinematics::{PointSet, control_points};
 use model::Motion;
-use motion_db::{
-    Clip, ControlTable, HeadingFrame, MotionDatabase, Neighbour, Query, Scratch, WindowIndex, resample,
-};
-use nalgebra::Vector3;
+use motion_db::{Clip, ControlTable, MotionDatabase, Neighbour, Query, Scratch, WindowIndex};
 use sample_motion::Action;
-
-const SIX: [&str; 6] = ["left_wrist", "right_wrist", "left_ankle", "right_ankle", "root", "head"];
-
-/// Questions that a motion asks: the window and the control points of each of some frames.
-struct Question {
-    features: Vec<f32>,
-    controls: Vec<f32>,
-}
-
-fn questions(database: &MotionDatabase, index: &WindowIndex, motion: &Motion) -> Vec<Question> {
-    let dofs = database.num_dofs();
-    let coordinates = resample(motion, database.parametrisation());
-    let poses: Vec<&[f64]> = coordinates.chunks_exact(dofs).collect();
-    let kinematics = database.kinematics(motion.skeleton());
-    let points = PointSet::new(&kinematics, control_points(motion.skeleton(), &SIX).unwrap());
-    let mut state = kinematics.state();
-    let mut found = vec![Vector3::zeros(); points.len()];
-    let (mut scratch, mut features) = (vec![0.0; index.width()], vec![0.0; index.width()]);
-    (index.window()..poses.len())
-        .step_by(17)
-        .map(|t| {
-            let window: Vec<&[f64]> = (1..=index.window()).map(|i| poses[t - i]).collect();
-            index.query_features(&window, &mut scratch, &mut features);
-            points.positions(&kinematics, poses[t], &mut state, &mut found);
-            let frame = HeadingFrame::of(poses[t - 1]);
-            let local = found.iter().flat_map(|p| {
-                let local: [f64; 3] = (frame.local_from_world(p) * 100.0).into();
-                local.map(|v| v as f32)
-            });
-            Question {
-                features: features.iter().map(|v| *v as f32).collect(),
-                controls: local.chain([0.0]).collect(),
-            }
-        })
-        .collect()
-}
 
 /// Panics unless `found` is `expected`, up to rows whose distances are the same to single precision.
 fn check_same(found: &[Neighbour], expected: &[Neighbour], what: &str) {
@@ -85,7 +46,7 @@ fn check_all(database: &MotionDatabase, index: &WindowIndex, asked: &Motion, ks:
     let two_clips: Vec<Range<usize>> =
         if database.clips().len() > 2 { vec![clip(0), clip(2)] } else { vec![] };
     let mut last = Vec::new();
-    for (q, question) in questions(database, index, asked).iter().enumerate() {
+    for (q, question) in questions(database, index, asked, 17).iter().enumerate() {
         let random: Vec<usize> = {
             let mut rows: Vec<usize> = (0..40).map(|_| numbers.below(index.num_rows())).collect();
             rows.sort_unstable();
@@ -155,7 +116,7 @@ fn equal_windows_come_in_the_order_of_their_rows() {
     let database = MotionDatabase::build(&[walk.clone(), walk.clone(), walk.clone()]).unwrap();
     let index = WindowIndex::new(&database, 2).unwrap();
     let (mut scratch, mut found) = (Scratch::default(), Vec::new());
-    for question in questions(&database, &index, &walk.motion) {
+    for question in questions(&database, &index, &walk.motion, 17) {
         let query = Query { features: &question.features, controls: None, exclude: &[], hints: &[] };
         index.nearest(&query, 3, &mut scratch, &mut found);
         let rows: Vec<usize> = found.iter().map(|n| n.row).collect();
@@ -179,7 +140,7 @@ fn recorded_windows_are_found_as_by_brute_force() {
 fn a_search_takes_no_memory_once_it_has_run() {
     let database = MotionDatabase::build(&drawn_clips(100)).unwrap();
     let index = WindowIndex::new(&database, 2).unwrap();
-    let asked = questions(&database, &index, &drawn(Action::Walk, 1, 50, 100).motion);
+    let asked = questions(&database, &index, &drawn(Action::Walk, 1, 50, 100).motion, 17);
     let (mut scratch, mut found) = (Scratch::default(), Vec::new());
     let mut ask = |question: &Question| {
         let query = Query { features: &question.features, controls: None, exclude: &[], hints: &[] };

@@ -124,7 +124,8 @@ impl Predictor for LocalRegression {
         out.rows = k;
         out.sigma.fill(parameters.min_sigma);
         kernel_weights(examples.distances_squared, parameters.bandwidth, &mut out.weights);
-        let nearest = examples.distances_squared.iter().copied().fold(f64::INFINITY, f64::min);
+        // What lies at infinity (a control point from a broken file) is far, but a number.
+        let nearest = examples.distances_squared.iter().copied().fold(1e100, f64::min);
         let ridge = parameters.ridge + parameters.ridge_distance * nearest / width as f64;
         let at = Layout::new(k, dofs);
         self.fill(at, examples, query.inputs, ridge, out);

@@ -13,7 +13,7 @@ pub struct LpcaParameters {
 
 impl Default for LpcaParameters {
     fn default() -> Self {
-        Self { variance: 0.99, smooth_sigma: 2.0 }
+        Self { variance: 1.0, smooth_sigma: 6.0 }
     }
 }
 

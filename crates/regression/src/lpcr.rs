@@ -15,7 +15,7 @@ pub struct LpcrParameters {
 
 impl Default for LpcrParameters {
     fn default() -> Self {
-        Self { components: 16 }
+        Self { components: 4 }
     }
 }
 

@@ -121,7 +121,8 @@ mod tests {
                         .map(|n| principal.component(n, count, width))
                         .map(|(variance, u, b)| variance.sqrt() * u[i] * b[j])
                         .sum();
-                    assert!((found - expected).abs() < 1e-9, "{count} × {width}");
+                    // Components are left out below 1e-5 of the largest standard deviation.
+                    assert!((found - expected).abs() < 1e-4, "{count} × {width}: {found} {expected}");
                 }
             }
         }

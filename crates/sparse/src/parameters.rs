@@ -105,6 +105,8 @@ pub struct Parameters {
     pub lpcr_components: usize,
     /// method gplvm: standard deviation of the pose about where the last two poses lead, degrees and centimetres
     pub gplvm_smooth_deg: f64,
+    /// method gplvm: standard deviation about what the model says, besides the model's own, degrees and centimetres
+    pub gplvm_sigma_deg: f64,
     /// most steps of the solver a frame
     pub max_steps: usize,
     /// start poses that are tried
@@ -150,10 +152,11 @@ impl Default for Parameters {
             ridge_distance: 1.0,
             bandwidth: 1.0,
             min_sigma_deg: 1.0,
-            lpca_variance: 0.99,
-            lpca_smooth_deg: 2.0,
-            lpcr_components: 16,
-            gplvm_smooth_deg: 3.0,
+            lpca_variance: 1.0,
+            lpca_smooth_deg: 6.0,
+            lpcr_components: 4,
+            gplvm_smooth_deg: 6.0,
+            gplvm_sigma_deg: 3.0,
             learn_zero_pose: true,
             zero_pose_frames: 120,
             smooth: false,
@@ -211,6 +214,7 @@ impl Parameters {
         number("lpca_variance", self.lpca_variance, 0.0, 1.0, "0 to 1")?;
         number("lpca_smooth_deg", self.lpca_smooth_deg, 1e-3, 1e6, "0.001 to 1000000 degrees")?;
         number("gplvm_smooth_deg", self.gplvm_smooth_deg, 1e-3, 1e6, "0.001 to 1000000 degrees")?;
+        number("gplvm_sigma_deg", self.gplvm_sigma_deg, 1e-3, 90.0, "0.001 to 90 degrees")?;
         number("lost_energy", self.lost_energy, 1.0, 1e12, "1 to 1e12")
     }
 
@@ -232,7 +236,7 @@ impl Parameters {
     }
 
     pub(crate) fn gplvm(&self) -> GplvmParameters {
-        GplvmParameters { smooth_sigma: self.gplvm_smooth_deg }
+        GplvmParameters { smooth_sigma: self.gplvm_smooth_deg, sigma: self.gplvm_sigma_deg }
     }
 
     pub(crate) fn solver(&self) -> SolverParameters {

@@ -1,8 +1,12 @@
 //! `marey evaluate`: how far reconstructions are from the truth.
 
 pub(crate) mod motions;
-mod papers;
+
+mod body_commands;
+mod run_command;
 mod sparse_command;
+mod sweep;
+mod written;
 
 /// `marey evaluate`
 #[derive(Debug, clap::Args)]
@@ -15,11 +19,20 @@ pub struct Args {
 enum What {
     /// Reconstruct recorded motion from a few of its own points, and compare
     Sparse(Box<sparse_command::Args>),
+    /// Fit skeletons to performers whose own is not given, and compare
+    Skeleton(body_commands::Args),
+    /// Hold standing feet in reconstructed motion, and compare
+    Feet(body_commands::Args),
+    /// Compare what a run has made with the motion that really was
+    Run(run_command::Args),
 }
 
 /// Runs `marey evaluate`.
 pub fn run(args: Args) -> anyhow::Result<()> {
     match args.what {
         What::Sparse(args) => sparse_command::run(&args),
+        What::Skeleton(args) => body_commands::skeletons(&args),
+        What::Feet(args) => body_commands::feet(&args),
+        What::Run(args) => run_command::run(&args),
     }
 }

@@ -10,6 +10,9 @@ use anyhow::{Context, bail};
 const ARCHIVES: [&str; 6] = [".zip", ".tar", ".tar.gz", ".tgz", ".tar.zst", ".tzst"];
 const MOTION_FILES: [&str; 3] = [".asf", ".amc", ".bvh"];
 
+/// Motions are uploaded in pieces of so many bytes: a server takes 512 MiB, and reads pieces one after the other.
+const PIECE_BYTES: u64 = 128 << 20;
+
 /// What to upload for a motion database.
 #[derive(Debug)]
 pub struct Upload {
@@ -21,7 +24,7 @@ pub struct Upload {
     pub num_files: usize,
 }
 
-/// Archives as they are; loose files and what is in folders packed into one.
+/// Archives as they are; loose files and what is in folders packed into one, or several if they are many.
 pub fn pack(name: &str, paths: &[PathBuf]) -> anyhow::Result<Vec<Upload>> {
     let mut uploads = Vec::new();
     let mut loose = Vec::new();
@@ -48,17 +51,48 @@ pub fn pack(name: &str, paths: &[PathBuf]) -> anyhow::Result<Vec<Upload>> {
         let name = path.strip_prefix(&above)?.to_owned();
         loose.push((path, name));
     }
-    if !loose.is_empty() {
-        // the order of a folder is no order
-        loose.sort_by(|a, b| a.1.cmp(&b.1));
-        let num_files = loose.len();
-        let file = write_tar(&loose)?;
-        uploads.push(Upload { name: format!("{name}.tar"), file, num_files });
+    // the order of a folder is no order
+    loose.sort_by(|a, b| a.1.cmp(&b.1));
+    let pieces = pieces(loose)?;
+    for (number, piece) in pieces.iter().enumerate() {
+        let name = match pieces.len() {
+            1 => format!("{name}.tar"),
+            _ => format!("{name}.{:03}.tar", number + 1),
+        };
+        uploads.push(Upload { name, file: write_tar(piece)?, num_files: piece.len() });
     }
     if uploads.is_empty() {
         bail!("there are no motion files (.asf, .amc, .bvh, also with .zst or .gz) in what was given");
     }
     Ok(uploads)
+}
+
+/// Motions in pieces that a server takes; in each all that tells of motions, skeletons and indices.
+fn pieces(files: Vec<(PathBuf, PathBuf)>) -> anyhow::Result<Vec<Vec<(PathBuf, PathBuf)>>> {
+    let is_motion = |(_, name): &(PathBuf, PathBuf)| {
+        has_extension(without_compression(&name.to_string_lossy()), &[".amc", ".bvh"])
+    };
+    let (motions, support): (Vec<_>, Vec<_>) = files.into_iter().partition(is_motion);
+    let mut pieces: Vec<Vec<(PathBuf, PathBuf)>> = Vec::new();
+    let mut bytes = 0;
+    for file in motions {
+        let size = fs::metadata(&file.0).with_context(|| file.0.display().to_string())?.len();
+        if pieces.is_empty() || bytes + size > PIECE_BYTES {
+            pieces.push(support.clone());
+            bytes = 0;
+        }
+        bytes += size;
+        if let Some(piece) = pieces.last_mut() {
+            piece.push(file);
+        }
+    }
+    if pieces.is_empty() && !support.is_empty() {
+        pieces.push(support);
+    }
+    for piece in &mut pieces {
+        piece.sort_by(|a, b| a.1.cmp(&b.1));
+    }
+    Ok(pieces)
 }
 
 fn common_folder(files: &[PathBuf]) -> PathBuf {
@@ -73,11 +107,11 @@ fn common_folder(files: &[PathBuf]) -> PathBuf {
 
 /// Whether a file holds motion or a skeleton by its name, or says more of those beside it.
 pub fn is_motion_file(name: &str) -> bool {
-    name.eq_ignore_ascii_case("index.csv")
-        || has_extension(
-            name.strip_suffix(".zst").or(name.strip_suffix(".gz")).unwrap_or(name),
-            &MOTION_FILES,
-        )
+    name.eq_ignore_ascii_case("index.csv") || has_extension(without_compression(name), &MOTION_FILES)
+}
+
+fn without_compression(name: &str) -> &str {
+    name.strip_suffix(".zst").or(name.strip_suffix(".gz")).unwrap_or(name)
 }
 
 fn has_extension(name: &str, extensions: &[&str]) -> bool {
@@ -115,4 +149,35 @@ fn write_tar(files: &[(PathBuf, PathBuf)]) -> anyhow::Result<File> {
 
 fn open(path: &Path) -> anyhow::Result<File> {
     File::open(path).with_context(|| path.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_motions_go_in_pieces_each_with_all_skeletons() -> anyhow::Result<()> {
+        let folder = tempfile::tempdir()?;
+        for name in ["16.asf", "index.csv", "16_01.amc", "16_02.amc", "16_03.bvh"] {
+            fs::write(folder.path().join(name), "x")?;
+        }
+        // sparse: it takes no room
+        File::options().write(true).open(folder.path().join("16_02.amc"))?.set_len(PIECE_BYTES)?;
+        let mut found = Vec::new();
+        collect(folder.path(), folder.path(), &mut found)?;
+        found.sort();
+        let names: Vec<Vec<String>> = pieces(found)?
+            .iter()
+            .map(|piece| piece.iter().map(|(_, name)| name.display().to_string()).collect())
+            .collect();
+        assert_eq!(
+            names,
+            [
+                ["16.asf", "16_01.amc", "index.csv"],
+                ["16.asf", "16_02.amc", "index.csv"],
+                ["16.asf", "16_03.bvh", "index.csv"]
+            ]
+        );
+        Ok(())
+    }
 }

@@ -59,6 +59,10 @@ fn placed(file: &str, mut entries: Vec<Entry>) -> Vec<Entry> {
 /// # Errors
 /// Gives up on names that no archive holds.
 pub(crate) fn pack(entries: &[Entry]) -> Result<Vec<u8>, JobError> {
+    if entries.is_empty() {
+        // An archive of nothing can't be told from zeros.
+        return Ok(Vec::new());
+    }
     let mut builder = tar::Builder::new(Vec::new());
     for entry in entries {
         let mut header = tar::Header::new_gnu();
@@ -76,6 +80,9 @@ pub(crate) fn pack(entries: &[Entry]) -> Result<Vec<u8>, JobError> {
 /// # Errors
 /// Tries again, as the archive was made by us.
 pub(crate) fn unpack_packed(bytes: &[u8]) -> Result<Vec<Entry>, JobError> {
+    if bytes.is_empty() {
+        return Ok(Vec::new());
+    }
     let limits =
         archive::Limits { total_bytes: u64::MAX, entries: usize::MAX, name_bytes: usize::MAX, ratio: 1 };
     archive::entries("parts.tar", bytes, &limits).map_err(JobError::retry)

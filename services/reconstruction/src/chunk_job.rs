@@ -7,7 +7,7 @@ use crate::{
 };
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
-use sparse::{Reconstructor, Session};
+use sparse::Session;
 use std::{ops::ControlFlow, sync::Arc, time::Instant};
 
 /// Artefact with the chunk's poses.
@@ -45,8 +45,7 @@ impl Handler for ChunkHandler {
         let (frames, of) = (payload.end.saturating_sub(payload.start), job.clone());
         let reconstruction = compute::run(move || -> Result<_, InputError> {
             let session = Session::from_bytes(&session)?;
-            let reconstructor =
-                Reconstructor::new(&prior.database, &prior.index, &session, &payload.parameters)?;
+            let reconstructor = prior.reconstructor(&session, &payload.parameters)?;
             let mut progress = |done: usize| {
                 if of.is_cancelled() {
                     return ControlFlow::Break(());

@@ -15,7 +15,7 @@ const AMC_FRAME_RATE: f64 = 120.0;
 
 /// A file's content.
 #[derive(Debug, Clone)]
-pub(crate) struct NamedBytes {
+pub struct NamedBytes {
     /// Name given by the user.
     pub name: String,
     /// `skeleton`, `control-points` or `ground-truth`; others are not looked at.

@@ -26,7 +26,11 @@ mod rpc;
 mod run_report;
 
 pub use error::InputError;
-pub use payload::{InputFile, MergeChunks, MotionDatabaseFile, Object, PlanSparse, ReconstructChunk};
+pub use evaluate::{Truth, truth_of};
+pub use inputs::NamedBytes;
+pub use payload::{
+    InputFile, MergeChunks, MotionDatabaseFile, Object, PlanSparse, Reading, ReconstructChunk,
+};
 pub use performer::FittedReport;
 
 use priors::Priors;

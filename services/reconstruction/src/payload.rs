@@ -52,8 +52,8 @@ impl PlanSparse {
 }
 
 /// What the files do not say of themselves.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Reading {
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reading {
     /// Of TRC and C3D files.
     pub points: PointsOptions,
     /// Of BVH files.

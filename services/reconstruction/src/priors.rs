@@ -1,9 +1,11 @@
 //! Motion databases as priors, kept in memory up to a bound and shared by jobs and calls.
 
-use crate::payload::MotionDatabaseFile;
+use crate::payload::{MotionDatabaseFile, Object};
 use motion_db::{MotionDatabase, WindowIndex};
 use queue::JobError;
-use service::{Cache, compute, config::MemoryConfig, motion_database};
+use regression::gplvm::Gplvm;
+use service::{Cache, compute, config::MemoryConfig, motion_database, objects};
+use sparse::{Parameters, Reconstructor, Session};
 use std::sync::Arc;
 use store::Store;
 
@@ -16,7 +18,30 @@ const DATABASE_SHARE: f64 = 0.25;
 pub(crate) struct Prior {
     pub database: Arc<MotionDatabase>,
     pub index: Arc<WindowIndex>,
+    /// For a run of method `gplvm`.
+    pub gplvm: Option<Arc<Gplvm>>,
 }
+
+impl Prior {
+    /// Reconstructs a session with this prior.
+    ///
+    /// # Errors
+    /// If session, database, parameters and model don't fit each other.
+    pub fn reconstructor<'a>(
+        &'a self,
+        session: &'a Session,
+        parameters: &'a Parameters,
+    ) -> sparse::Result<Reconstructor<'a>> {
+        let reconstructor = Reconstructor::new(&self.database, &self.index, session, parameters)?;
+        match &self.gplvm {
+            Some(model) => reconstructor.with_model(model),
+            None => Ok(reconstructor),
+        }
+    }
+}
+
+/// Largest trained model, bytes: the greatest active set of a skeleton of 1,000 degrees of freedom takes half of it.
+const MAX_MODEL_BYTES: u64 = 64 << 20;
 
 pub(crate) struct Priors {
     store: Store,
@@ -24,6 +49,8 @@ pub(crate) struct Priors {
     databases: Cache<String, MotionDatabase>,
     /// by checksum and length of the windows, frames
     indexes: Cache<(String, usize), WindowIndex>,
+    /// by checksum
+    models: Cache<String, Gplvm>,
 }
 
 impl Priors {
@@ -33,6 +60,7 @@ impl Priors {
             store,
             databases: Cache::new(databases),
             indexes: Cache::new(memory.database_cache_bytes - databases),
+            models: Cache::new(4 * MAX_MODEL_BYTES),
         }
     }
 
@@ -83,6 +111,28 @@ impl Priors {
             Ok::<_, JobError>((index, bytes))
         };
         let index = self.indexes.get_or_load((file.blake3.clone(), window), load).await?;
-        Ok(Prior { database, index })
+        let gplvm = match &file.gplvm {
+            Some(model) => Some(self.gplvm(model).await?),
+            None => None,
+        };
+        Ok(Prior { database, index, gplvm })
+    }
+
+    async fn gplvm(&self, model: &Object) -> Result<Arc<Gplvm>, JobError> {
+        let load = async {
+            let input = objects::Input {
+                name: "the trained gplvm",
+                store_key: &model.store_key,
+                blake3: &model.blake3,
+            };
+            let bytes = objects::read(&self.store, input, MAX_MODEL_BYTES).await?;
+            let size = bytes.len() as u64;
+            let model = compute::run(move || Gplvm::from_bytes(&bytes)).await;
+            let model = model.map_err(|e| {
+                JobError::give_up(format!("the trained gplvm can't be used: {e}"), format!("{e:?}"))
+            })?;
+            Ok::<_, JobError>((model, size))
+        };
+        self.models.get_or_load(model.blake3.clone(), load).await
     }
 }

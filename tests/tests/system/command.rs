@@ -126,6 +126,20 @@ fn the_first_session_goes_by_the_commands_of_the_help() -> Result<()> {
     assert!(marey(here, &["status", &run])?.contains("succeeded"));
     marey(here, &["results", &run, "-o", "take3"])?;
     assert!(fs::read_to_string(here.join("take3/motion.bvh"))?.starts_with("HIERARCHY"));
+    let untold = marey(here, &["evaluate", "run", &run]).unwrap_err().to_string();
+    assert!(untold.contains("marey upload") && untold.contains("--truth"), "{untold}");
+    fs::write(here.join("truth.amc"), trials::motion(41, 360))?;
+    let told = marey(here, &["evaluate", "run", &run, "--truth", "truth.amc"])?;
+    assert!(told.contains("joint angles, RMS, degrees"), "{told}");
+    // uploaded after the run, it is found without being named
+    marey(here, &["upload", "take 3", "truth.amc"])?;
+    let args = ["evaluate", "run", &run, "--json", "errors.json", "--html", "errors.html"];
+    assert!(marey(here, &args)?.starts_with(told.trim_end()), "the same as with the file");
+    let errors: serde_json::Value = serde_json::from_slice(&fs::read(here.join("errors.json"))?)?;
+    assert_eq!(errors["errors"]["frames"], 180);
+    let rms = errors["errors"]["rms_deg"].as_f64().context("no error")?;
+    assert!(rms > 0.0 && rms < 10.0, "{rms}");
+    assert!(fs::read_to_string(here.join("errors.html"))?.ends_with("</html>\n"));
     let key = marey(here, &["key", "create", "--project", "film", "--scopes", "read"])?;
     let sessions = marey(here, &["status", "--api-key", key.trim()])?;
     assert!(sessions.contains("no runs yet"), "another project sees none: {sessions}");

@@ -80,7 +80,8 @@ pub fn evaluate_feet(
             largest_acceleration,
         })
     };
-    let (Some(truth), Some(free), Some(found)) = (numbers(truth), numbers(&free), numbers(&held.motion)) else {
+    let (Some(truth), Some(free), Some(found)) = (numbers(truth), numbers(&free), numbers(&held.motion))
+    else {
         return Ok(None);
     };
     let (mut both, mut true_frames, mut found_frames) = (0.0, 0.0f64, 0.0f64);

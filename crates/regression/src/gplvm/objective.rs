@@ -77,7 +77,8 @@ impl Objective {
     fn kernel(&self, x: &[f64]) -> Option<Kernel> {
         let (count, dims) = (self.features.nrows(), self.latent_dims);
         let (inverse_width, noise) = (x[count * dims].exp(), x[count * dims + 1].exp());
-        let in_range = inverse_width.is_finite() && noise.is_finite() && noise > 1e-8;
+        // The prior of γ and β is not a distribution: where poses say nothing of them, they would run off.
+        let in_range = (1e-6..=1e6).contains(&inverse_width) && (1e-8..=1.0).contains(&noise);
         if !in_range {
             return None;
         }

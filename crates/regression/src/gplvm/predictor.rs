@@ -15,11 +15,14 @@ const LEAST_DECREASE: f64 = 0.02;
 pub struct GplvmParameters {
     /// standard deviation of the pose about where the last two poses lead, feature units
     pub smooth_sigma: f64,
+    /// standard deviation of every feature about what the model says, besides the model's own, feature units: poses are
+    /// not on a surface of a few dimensions
+    pub sigma: f64,
 }
 
 impl Default for GplvmParameters {
     fn default() -> Self {
-        Self { smooth_sigma: 3.0 }
+        Self { smooth_sigma: 6.0, sigma: 3.0 }
     }
 }
 
@@ -29,7 +32,7 @@ impl Default for GplvmParameters {
 /// E(q, x) = Σ_k (y_k(q) − f_k(x))²/s_k²(x) + ln s_k²(x) + ‖x‖² + ‖q − 2 q_{t−1} + q_{t−2}‖²/τ²
 /// ```
 ///
-/// with `s_k²(x) = σ²(x)/w_k² + σ_min²`. Examples serve as a first guess only: the successor of the nearest.
+/// with `s_k²(x) = σ²(x)/w_k² + σ²`. Examples serve as a first guess only: the successor of the nearest.
 #[derive(Debug, Clone)]
 pub struct GplvmPredictor<'a> {
     model: &'a Gplvm,
@@ -59,8 +62,7 @@ struct Known {
 }
 
 impl Known {
-    fn set(&mut self, query: &Query<'_>, floor: f64) {
-        self.floor = floor;
+    fn set(&mut self, query: &Query<'_>) {
         let dofs = self.before.len();
         let (newest, older) = (query.pose(1, dofs), query.pose(2, dofs));
         self.has_before = newest.is_some();
@@ -100,7 +102,7 @@ impl<'a> GplvmPredictor<'a> {
                 onwards: vec![0.0; dofs],
                 has_onwards: false,
                 smoothness: parameters.smooth_sigma.powi(-2),
-                floor: 0.0,
+                floor: parameters.sigma.powi(2),
             },
             centred: vec![0.0; 2 * dofs],
             best: f64::INFINITY,
@@ -158,10 +160,10 @@ impl Predictor for GplvmPredictor<'_> {
         &mut self,
         examples: &Examples<'_>,
         query: &Query<'_>,
-        parameters: &Parameters,
+        _parameters: &Parameters,
         out: &mut Prediction,
     ) {
-        self.known.set(query, parameters.min_sigma.powi(2));
+        self.known.set(query);
         let guess = match examples.nearest() {
             Some(k) => examples.target(k),
             None if self.known.has_onwards => &self.known.onwards,

@@ -87,17 +87,15 @@ fn print_skeleton_row(points: usize, source: SkeletonSource, results: &[&Skeleto
         results.iter().map(|r| value(r)).sum::<f64>() / results.len().max(1) as f64
     };
     let length = |i: usize| {
-        let (cm, percent) =
-            (mean(&|r| 100.0 * r.error_m[i].abs()), mean(&|r| r.error_percent[i].abs()));
+        let (cm, percent) = (mean(&|r| 100.0 * r.error_m[i].abs()), mean(&|r| r.error_percent[i].abs()));
         format!("{cm:.1} cm {percent:.1} %")
     };
     let name = format!("{source:?}").to_lowercase();
     print!("{points:<8}{name:<10}{:<14}{:<14}{:<14}", length(0), length(1), length(2));
     print!("{:.2} cm  {:.2}°", mean(&|r| r.mpjpe_cm), mean(&|r| r.rms_deg));
     if results.iter().any(|r| r.deviations.is_some()) {
-        let within = mean(&|r| {
-            r.deviations.map_or(0.0, |d| d.iter().filter(|d| d.abs() < 1.0).count() as f64 / 3.0)
-        });
+        let within =
+            mean(&|r| r.deviations.map_or(0.0, |d| d.iter().filter(|d| d.abs() < 1.0).count() as f64 / 3.0));
         print!("  {:.0} % of limbs within 1 σ", 100.0 * within);
     }
     println!();
@@ -119,7 +117,9 @@ pub fn feet(args: &Args) -> anyhow::Result<()> {
     let database = MotionDatabase::build(&train)?;
     let index = WindowIndex::new(&database, parameters.window)?;
     let mut results = Vec::new();
-    println!("points  motion  angles   joints    slide in true contacts   balls in found   acceleration   largest");
+    println!(
+        "points  motion  angles   joints    slide in true contacts   balls in found   acceleration   largest"
+    );
     for &points in &args.points {
         let first = results.len();
         for clip in &test {

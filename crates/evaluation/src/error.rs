@@ -1,0 +1,56 @@
+/// Why an evaluation cannot run.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A number of control points without a set.
+    #[error("found no set of {found} control points, expected 2 to 6")]
+    Points {
+        /// number asked for
+        found: usize,
+    },
+    /// Noise that is none.
+    #[error("noise of control points is {} mm, expected 0 to 1000 mm", .found_m * 1e3)]
+    Noise {
+        /// standard deviation, metres
+        found_m: f64,
+    },
+    /// A gap that is none.
+    #[error(
+        "occlusion is {found:?}, expected what is hidden and how long, one:0.5s or all:0.5s (up to 600 s)"
+    )]
+    Occlusion {
+        /// what was found
+        found: String,
+    },
+    /// A parameter out of range.
+    #[error(transparent)]
+    Parameters {
+        /// which, and what is wrong with it
+        source: sparse::Error,
+    },
+    /// The threads do not start.
+    #[error("cannot start {wanted} threads: {problem}")]
+    Threads {
+        /// number of threads
+        wanted: usize,
+        /// what the system says
+        problem: String,
+    },
+    /// A model cannot be trained.
+    #[error("training the latent variable model: {source}")]
+    Training {
+        /// what is wrong
+        source: sparse::Error,
+    },
+    /// A trial cannot be reconstructed.
+    #[error("trial {trial}: {source}")]
+    Trial {
+        /// name of the trial
+        trial: String,
+        /// what is wrong
+        source: sparse::Error,
+    },
+    /// The database cannot be built.
+    #[error(transparent)]
+    Database(#[from] motion_db::Error),
+}

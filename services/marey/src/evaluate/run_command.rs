@@ -1,0 +1,211 @@
+//! `marey evaluate run`.
+
+use std::{fs, path::PathBuf};
+
+use anyhow::{Context, bail};
+use evaluation::{
+    Comparison, ContactThresholds, FootPaths, FootSlide, at_60_hz, compare_in_detail, foot_slide,
+    report::{About, errors_of_one, run_report},
+};
+use formats::BvhOptions;
+use kinematics::{Parametrisation, References};
+use model::Motion;
+use reconstruction::{NamedBytes, Reading, Truth, truth_of};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::written::{command, write};
+use crate::{
+    cli::ServerArgs,
+    client::{Client, ResultFile, encode},
+};
+
+/// Most bytes of an unpacked file.
+const MAX_BYTES: u64 = 2 << 30;
+/// Role of the file that has the truth.
+const TRUTH: &str = "ground-truth";
+/// Role of the file that has the performer's skeleton.
+const SKELETON: &str = "skeleton";
+
+/// `marey evaluate run`
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+The truth is the session's file of role ground-truth (an AMC on the session's skeleton, or a BVH), also when it was uploaded after the run:
+
+  marey upload \"take 3\" truth.amc
+  marey evaluate run RUN --html report.html
+  marey evaluate run RUN --truth truth.amc")]
+pub struct Args {
+    /// The run's id
+    run: String,
+    /// The true motion: AMC or BVH, also .zst [default: the session's ground-truth file]
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Write a report to this file: one page with tables and plots, to be opened in a browser
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Write the errors, by frame and by joint, to this file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// What is looked at of a run.
+#[derive(Debug, Deserialize)]
+struct Run {
+    id: String,
+    kind: String,
+    state: String,
+    session_id: Option<String>,
+    parameters: Value,
+}
+
+/// What is looked at of a session's file.
+#[derive(Debug, Deserialize)]
+struct SessionFile {
+    name: String,
+    role: String,
+    blake3: String,
+}
+
+#[derive(Serialize)]
+struct Json<'a> {
+    run: &'a str,
+    truth: &'a str,
+    #[serde(flatten)]
+    comparison: &'a Comparison,
+    foot_slide: Option<FootSlide>,
+}
+
+/// Runs `marey evaluate run`.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let client = Client::new(args.server.server()?);
+    let run: Run = client.get(&format!("/v1/runs/{}", encode(&args.run)))?;
+    if run.kind != "reconstruction" {
+        bail!("run {} is of kind {}: there is no motion to compare", run.id, run.kind);
+    }
+    if run.state != "succeeded" {
+        bail!("run {} is {}, expected succeeded; see `marey status {}`", run.id, run.state, run.id);
+    }
+    let downloads = Downloads { client: &client, folder: tempfile::tempdir()? };
+    let session = run.session_id.as_deref().context("the run's session is not there any more")?;
+    let files = inputs(args, &downloads, session)?;
+    let Some(name) = files.iter().find(|f| f.role == TRUTH).map(|f| f.name.clone()) else {
+        bail!(
+            "run {} has no truth to be compared with: its session has no file of role ground-truth; upload the true motion on \
+             the session's skeleton (`marey upload {session} truth.amc`, or a .bvh), or give it: `marey evaluate run {} --truth FILE`",
+            run.id,
+            run.id
+        );
+    };
+    let found = downloads.motion(&run.id, is_bvh(&name))?;
+    let mut reading = Reading::default();
+    if let Some(metres) = run.parameters["bvh_metres_per_unit"].as_f64() {
+        reading.bvh.metres_per_unit = metres;
+    }
+    let truth = match truth_of(&found, &files, found.skeleton(), reading)? {
+        Truth::Known(truth) => truth,
+        Truth::Unknown => bail!("{name} has no motion"),
+        Truth::OtherSkeleton => {
+            bail!(
+                "{name} is on a skeleton of other joints than the result, expected the same: they can't be compared"
+            )
+        }
+    };
+    let rest = References::rest(truth.skeleton());
+    let truth = at_60_hz(&Parametrisation::smooth(truth.skeleton(), &rest)?, &truth, usize::MAX)?;
+    let comparison = compare_in_detail(&truth, &found);
+    let slide = FootPaths::of(&truth)
+        .zip(FootPaths::of(&found))
+        .and_then(|(truth, found)| foot_slide(&truth, &found, &ContactThresholds::default()));
+    let table = errors_of_one(&comparison, slide.as_ref());
+    println!("run {} beside {name}\n{}", run.id, table.text().trim_end());
+    if truth.num_frames() != found.num_frames() {
+        println!(
+            "the truth has {} frames at 60 a second, the result {}: those that both have were compared",
+            truth.num_frames(),
+            found.num_frames()
+        );
+    }
+    if let Some(path) = &args.json {
+        let json = Json { run: &run.id, truth: &name, comparison: &comparison, foot_slide: slide };
+        write(path, serde_json::to_vec_pretty(&json)?)?;
+    }
+    if let Some(path) = &args.html {
+        write(path, run_report(&about(&run, &name), &comparison, slide.as_ref()).into_bytes())?;
+    }
+    Ok(())
+}
+
+/// The files that tell the truth: the session's skeleton, and its ground truth or the file given.
+fn inputs(args: &Args, downloads: &Downloads<'_>, session: &str) -> anyhow::Result<Vec<NamedBytes>> {
+    let session = format!("/v1/sessions/{}/files", encode(session));
+    let listed: Vec<SessionFile> = downloads.client.get(&session)?;
+    let mut files = Vec::new();
+    for file in listed {
+        if file.role == SKELETON || (file.role == TRUTH && args.truth.is_none()) {
+            let bytes = downloads.get(&format!("{session}/{}", encode(&file.name)), &file.blake3)?;
+            files.push(NamedBytes { name: file.name, role: file.role, bytes: bytes.into() });
+        }
+    }
+    if let Some(path) = &args.truth {
+        let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        files.push(NamedBytes { name, role: TRUTH.to_owned(), bytes: bytes.into() });
+    }
+    files.into_iter().map(|file| Ok(file.unpacked(MAX_BYTES)?)).collect()
+}
+
+fn is_bvh(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    let name = name.strip_suffix(".zst").or(name.strip_suffix(".gz")).unwrap_or(&name);
+    name.ends_with(".bvh")
+}
+
+/// Downloads with their checksums checked, kept no longer than needed.
+struct Downloads<'a> {
+    client: &'a Client,
+    folder: TempDir,
+}
+
+impl Downloads<'_> {
+    fn get(&self, path: &str, blake3: &str) -> anyhow::Result<Vec<u8>> {
+        let to = self.folder.path().join("download");
+        self.client.download(path, blake3, &to)?;
+        Ok(fs::read(to)?)
+    }
+
+    /// A run's motion: as BVH beside a BVH, whose joints have that file's channels; else as AMC with its skeleton.
+    fn motion(&self, run: &str, as_bvh: bool) -> anyhow::Result<Motion> {
+        let results = format!("/v1/runs/{}/results", encode(run));
+        let listed: Vec<ResultFile> = self.client.get(&results)?;
+        let file = |name: &str| {
+            let found = listed.iter().find(|file| file.name == name);
+            let found = found.with_context(|| format!("run {run} has no result {name}"))?;
+            self.get(&format!("{results}/{name}"), &found.blake3)
+        };
+        if as_bvh {
+            return Ok(formats::bvh::read(&file("motion.bvh")?, &BvhOptions::default())?.value);
+        }
+        let acclaim = formats::asf::read(&file("skeleton.asf")?)?.value;
+        Ok(formats::amc::read(&file("motion.amc")?, &acclaim, motion_db::FRAME_RATE)?.value)
+    }
+}
+
+fn about(run: &Run, truth: &str) -> About {
+    let word = |value: &Value| value.as_str().map_or(value.to_string(), str::to_owned);
+    let parameters = run.parameters["parameters"].as_object().into_iter().flatten();
+    About {
+        title: format!("Run {}", run.id),
+        introduction: format!("A reconstructed motion beside the true one, {truth}."),
+        facts: vec![
+            ("session".to_owned(), word(&run.parameters["session_name"])),
+            ("motion database".to_owned(), word(&run.parameters["motion_database"]["name"])),
+        ],
+        command: command(),
+        parameters: parameters.map(|(name, value)| (name.clone(), word(value))).collect(),
+        warning: String::new(),
+    }
+}
