@@ -31,6 +31,7 @@ pub struct System {
     store: TempDir,
     shutdown: CancellationToken,
     gateway: Option<Gateway>,
+    replicas: gateway::Replicas,
     services: Vec<Running>,
     url: String,
 }
@@ -52,7 +53,7 @@ impl System {
         let runtime = Runtime::new()?;
         let shutdown = CancellationToken::new();
         let store = TempDir::new()?;
-        let (database, gateway) = runtime.block_on(async {
+        let (database, gateway, replicas) = runtime.block_on(async {
             let database = database.await?;
             let mut config = gateway::Config::new(database.url(), Location::folder(store.path()));
             config.listen = any_port();
@@ -60,7 +61,7 @@ impl System {
             config.upload_stall = Duration::from_secs(5);
             config.max_connections = 8;
             let gateway = Gateway::start(&config, shutdown.clone()).await?;
-            anyhow::Ok((database, gateway))
+            anyhow::Ok((database, gateway, config.reconstruction))
         })?;
         let url = format!("http://{}", gateway.address());
         Ok(Self {
@@ -69,6 +70,7 @@ impl System {
             store,
             shutdown,
             gateway: Some(gateway),
+            replicas,
             services: Vec::new(),
             url,
         })
@@ -92,7 +94,9 @@ impl System {
     /// Starts a reconstruction in this process, of so many jobs at once.
     pub fn start_reconstruction(&mut self, workers: usize) -> anyhow::Result<()> {
         let (config, shutdown) = (self.service_config(workers), self.shutdown.clone());
-        self.services.push(self.runtime()?.block_on(reconstruction::start(config, shutdown))?);
+        let service = self.runtime()?.block_on(reconstruction::start(config, shutdown))?;
+        self.replicas.set(service.address);
+        self.services.push(service);
         Ok(())
     }
 

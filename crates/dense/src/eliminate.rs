@@ -98,14 +98,13 @@ fn corner(
             u[r][s] = rows[r * stride + i + s] - sums[r][s] - known;
         }
         // Also where it is not a number.
-        if !(u[r][r] > floor) {
+        let is_above = u[r][r] > floor;
+        if !is_above {
             is_good = false;
             u[r][r] = floor;
         }
         inverse[r] = 1.0 / u[r][r].sqrt();
-        for s in r..ROWS {
-            u[r][s] *= inverse[r];
-        }
+        u[r][r..].iter_mut().for_each(|v| *v *= inverse[r]);
     }
     (u, inverse, is_good)
 }

@@ -89,8 +89,8 @@ impl Linearisation {
         system.fill(0.0);
         for (i, row) in system.chunks_exact_mut(stride).enumerate() {
             if i < rows {
-                for k in i..rows {
-                    row[k] = share * self.products[k * rows + i];
+                for (k, value) in row[..rows].iter_mut().enumerate().skip(i) {
+                    *value = share * self.products[k * rows + i];
                 }
                 row[i] += variances[i];
             } else {

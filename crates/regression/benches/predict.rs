@@ -26,7 +26,7 @@ fn local_regression(bencher: Bencher, neighbours: usize) {
         targets: &targets,
         distances_squared: &distances_squared,
     };
-    let mut regression = LocalRegression::new(neighbours, WIDTH, DOFS);
+    let mut regression = LocalRegression::new(neighbours, DOFS);
     let mut prediction = Prediction::new(neighbours, DOFS);
     let parameters = Parameters::default();
     bencher.bench_local(|| regression.predict(&examples, &query, &parameters, &mut prediction));

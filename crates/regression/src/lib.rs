@@ -15,7 +15,7 @@
 //! let examples = Examples { width: 1, dofs: 1, inputs: &inputs, targets: &targets, distances_squared: &[2.2, 0.2, 0.3, 2.3] };
 //! let mut prediction = Prediction::new(4, 1);
 //! let parameters = Parameters { ridge: 1e-6, ridge_distance: 0.0, ..Parameters::default() };
-//! LocalRegression::new(4, 1, 1).predict(&examples, &Query { inputs: &[1.5], recent: &[] }, &parameters, &mut prediction);
+//! LocalRegression::new(4, 1).predict(&examples, &Query { inputs: &[1.5], recent: &[] }, &parameters, &mut prediction);
 //! assert!((prediction.mean[0] - 3.0).abs() < 1e-3);
 //! ```
 

@@ -53,7 +53,7 @@ impl Layout {
 
 impl LocalRegression {
     /// Memory for `neighbours` examples of `dofs` targets; the number of inputs may be any.
-    pub fn new(neighbours: usize, _width: usize, dofs: usize) -> Self {
+    pub fn new(neighbours: usize, dofs: usize) -> Self {
         let layout = Layout::new(neighbours, dofs);
         Self {
             system: vec![0.0; layout.rows * layout.stride],
@@ -198,7 +198,7 @@ mod tests {
         let examples = Examples { width, dofs, inputs: &x, targets: &y, distances_squared: &distances };
         let parameters = Parameters { ridge: 0.05, ridge_distance: 0.0, ..Parameters::default() };
         let mut prediction = Prediction::new(k, dofs);
-        LocalRegression::new(k, width, dofs).predict(
+        LocalRegression::new(k, dofs).predict(
             &examples,
             &Query { inputs: &query, recent: &[] },
             &parameters,
@@ -221,7 +221,7 @@ mod tests {
         let examples = Examples { width, dofs: 1, inputs: &x, targets: &y, distances_squared: &distances };
         let parameters = Parameters { ridge: 0.1, ridge_distance: 0.0, ..Parameters::default() };
         let mut prediction = Prediction::new(k, 1);
-        let mut regression = LocalRegression::new(k, width, 1);
+        let mut regression = LocalRegression::new(k, 1);
         regression.predict(
             &examples,
             &Query { inputs: &x[..width], recent: &[] },

@@ -32,7 +32,7 @@ fn allocations(predictor: &mut dyn Predictor, k: usize, width: usize, dofs: usiz
 #[test]
 fn a_prediction_takes_no_memory() {
     for k in [64, 63, 2, 1] {
-        assert_eq!(allocations(&mut LocalRegression::new(64, 142, 62), k, 142, 62), 0, "{k} examples");
+        assert_eq!(allocations(&mut LocalRegression::new(64, 62), k, 142, 62), 0, "{k} examples");
         assert_eq!(allocations(&mut NearestExample, k, 142, 62), 0, "{k} examples");
     }
 }

@@ -31,7 +31,7 @@ fn what_is_affine_is_predicted_beyond_the_examples() {
         Examples { width, dofs, inputs: &inputs, targets: &targets, distances_squared: &distances };
     let mut prediction = Prediction::new(k, dofs);
     let query: Vec<f64> = (0..width).map(|i| 25.0 + i as f64).collect();
-    LocalRegression::new(k, width, dofs).predict(&examples, &at(&query), &EXACT, &mut prediction);
+    LocalRegression::new(k, dofs).predict(&examples, &at(&query), &EXACT, &mut prediction);
     for d in 0..dofs {
         assert!((prediction.mean[d] - line(&query, d)).abs() < 1e-4, "target {d}");
     }
@@ -52,11 +52,11 @@ fn a_prediction_does_not_depend_on_the_one_before() {
     };
     let query = vec![1.0; width];
     let parameters = Parameters::default();
-    let mut used = LocalRegression::new(40, width, dofs);
+    let mut used = LocalRegression::new(40, dofs);
     let mut out = Prediction::new(40, dofs);
     used.predict(&with(40), &at(&[3.0; 6]), &parameters, &mut out);
     used.predict(&with(7), &at(&query), &parameters, &mut out);
-    let (mut fresh, mut expected) = (LocalRegression::new(40, width, dofs), Prediction::new(40, dofs));
+    let (mut fresh, mut expected) = (LocalRegression::new(40, dofs), Prediction::new(40, dofs));
     fresh.predict(&with(7), &at(&query), &parameters, &mut expected);
     assert_eq!(out.mean, expected.mean);
     assert_eq!(out.residuals[..7 * dofs], expected.residuals[..7 * dofs]);
@@ -69,7 +69,7 @@ fn a_strong_ridge_predicts_the_weighted_mean() {
         Examples { width: 3, dofs: 2, inputs: &inputs, targets: &targets, distances_squared: &distances };
     let parameters = Parameters { ridge: 1e12, ..EXACT };
     let mut out = Prediction::new(20, 2);
-    LocalRegression::new(20, 3, 2).predict(&examples, &at(&[50.0; 3]), &parameters, &mut out);
+    LocalRegression::new(20, 2).predict(&examples, &at(&[50.0; 3]), &parameters, &mut out);
     for d in 0..2 {
         let mean: f64 = (0..20).map(|k| out.weights[k] * targets[2 * k + d]).sum();
         assert!((out.mean[d] - mean).abs() < 1e-6);
@@ -100,7 +100,7 @@ fn degenerate_examples_give_finite_predictions() {
             let examples =
                 Examples { width, dofs, inputs: &inputs, targets: &targets, distances_squared: &distances };
             let mut out = Prediction::new(k, dofs);
-            let mut regression = LocalRegression::new(k, width, dofs);
+            let mut regression = LocalRegression::new(k, dofs);
             regression.predict(&examples, &at(&[3.0; 4]), &Parameters::default(), &mut out);
             let all = out.mean.iter().chain(&out.residuals).chain(&out.weights);
             assert!(all.clone().all(|v| v.is_finite()), "{k} examples, spread {spread}, {distance}: {out:?}");

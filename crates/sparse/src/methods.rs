@@ -11,7 +11,7 @@ pub fn predictor<'a>(reconstructor: &'a Reconstructor<'_>, width: usize) -> Resu
     let parameters = reconstructor.parameters;
     let (k, dofs) = (parameters.neighbours, reconstructor.database.num_dofs());
     Ok(match parameters.method {
-        Method::LocalRegression => Box::new(LocalRegression::new(k, width, dofs)),
+        Method::LocalRegression => Box::new(LocalRegression::new(k, dofs)),
         Method::Nearest => Box::new(NearestExample),
         Method::Lpca => Box::new(LocalPca::new(k, dofs, parameters.lpca())),
         Method::Lpcr => Box::new(PrincipalRegression::new(k, width, dofs, parameters.lpcr())),

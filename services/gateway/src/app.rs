@@ -2,9 +2,9 @@ use std::{sync::Arc, time::Duration};
 
 use sqlx::PgPool;
 use store::Store;
-use tokio_util::sync::CancellationToken;
+use tokio_util::{sync::CancellationToken, task::TaskTracker};
 
-use crate::{Config, changes::Changes, observe::HttpCounts};
+use crate::{Config, changes::Changes, live::Live, observe::HttpCounts};
 
 /// What every handler shares.
 #[derive(Debug, Clone)]
@@ -17,6 +17,7 @@ pub struct App {
     pub limits: Limits,
     pub(crate) http_counts: Arc<HttpCounts>,
     pub(crate) changes: Changes,
+    pub(crate) live: Live,
     /// streams that would go on end when this is cancelled
     pub(crate) shutdown: CancellationToken,
 }
@@ -45,6 +46,7 @@ impl App {
             },
             http_counts: Arc::default(),
             changes: Changes::default(),
+            live: Live { replicas: config.reconstruction.clone(), tasks: TaskTracker::new() },
             shutdown,
         }
     }

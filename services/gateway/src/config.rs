@@ -2,6 +2,8 @@ use std::{net::SocketAddr, time::Duration};
 
 use store::Location;
 
+use crate::Replicas;
+
 /// What the gateway needs to know, read once at the start.
 #[derive(Debug, Clone)]
 pub struct Config {
@@ -20,6 +22,9 @@ pub struct Config {
     pub request_timeout: Duration,
     /// PostgreSQL connections to hold at most (default 16)
     pub max_connections: u32,
+    /// the reconstruction services that live streams go to (`MAREY_RECONSTRUCTION`, default `http://127.0.0.1:50052`;
+    /// several separated by commas)
+    pub reconstruction: Replicas,
     /// an API key to be valid from the start, with all scopes on project `default` (`MAREY_BOOTSTRAP_KEY`); for
     /// deployments that make their keys elsewhere
     pub bootstrap_key: Option<String>,
@@ -27,6 +32,9 @@ pub struct Config {
 
 /// Default for [`Config::max_upload_bytes`], bytes.
 pub const DEFAULT_MAX_UPLOAD_BYTES: u64 = 512 << 20;
+
+/// Default for [`Config::reconstruction`]: the service's own.
+const DEFAULT_RECONSTRUCTION: &str = "http://127.0.0.1:50052";
 
 impl Config {
     /// The defaults, with a database and a store.
@@ -39,6 +47,7 @@ impl Config {
             upload_stall: Duration::from_secs(60),
             request_timeout: Duration::from_secs(30),
             max_connections: 16,
+            reconstruction: Replicas::default(),
             bootstrap_key: None,
         }
     }
@@ -66,6 +75,10 @@ impl Config {
                 anyhow::anyhow!("MAREY_MAX_UPLOAD_BYTES is {bytes:?}, expected a number of bytes")
             })?;
         }
+        let replicas = variable("MAREY_RECONSTRUCTION").filter(|addresses| !addresses.is_empty());
+        let replicas = replicas.unwrap_or_else(|| DEFAULT_RECONSTRUCTION.to_owned());
+        config.reconstruction =
+            replicas.parse().map_err(|e| anyhow::anyhow!("MAREY_RECONSTRUCTION has {e}"))?;
         config.bootstrap_key = variable("MAREY_BOOTSTRAP_KEY").filter(|key| !key.is_empty());
         Ok(config)
     }

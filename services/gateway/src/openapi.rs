@@ -28,6 +28,7 @@ const KEY: &str = "api_key";
         (name = "files", description = "What was uploaded to a session"),
         (name = "motion databases", description = "Recorded motion to learn from: named, versioned, immutable once built"),
         (name = "runs", description = "Work that was asked for, its progress and its results"),
+        (name = "live", description = "Motion while it happens, on a WebSocket"),
         (name = "me", description = "Who you are to this server"),
         (name = "operations", description = "Probes and metrics, without a key"),
     ),

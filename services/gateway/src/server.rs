@@ -3,6 +3,7 @@
 use std::{net::SocketAddr, time::Duration};
 
 use anyhow::Context;
+use axum::serve::ListenerExt;
 use sqlx::postgres::PgPoolOptions;
 use store::Store;
 use tokio::{net::TcpListener, task::JoinHandle};
@@ -42,7 +43,14 @@ impl Gateway {
             .await
             .with_context(|| format!("can't listen on {}", config.listen))?;
         let address = listener.local_addr()?;
+        // Small answers must not wait for the acknowledgement of the last one.
+        let listener = listener.tap_io(|connection| {
+            if let Err(error) = connection.set_nodelay(true) {
+                tracing::debug!(%error, "a connection holds small answers back");
+            }
+        });
         tracing::info!(%address, "gateway listens");
+        let streams = app.live.tasks.clone();
         let background = [
             tokio::spawn(app.changes.clone().listen(db.clone(), shutdown.clone())),
             tokio::spawn(housekeeping::run(app.clone(), shutdown.clone())),
@@ -51,6 +59,13 @@ impl Gateway {
             let serving = axum::serve(listener, routes::router(app))
                 .with_graceful_shutdown(shutdown.clone().cancelled_owned())
                 .into_future();
+            // Live streams are no requests any more: their last states are waited for as well.
+            let serving = async {
+                let served = serving.await;
+                streams.close();
+                streams.wait().await;
+                served
+            };
             tokio::select! {
                 served = serving => served?,
                 () = async { shutdown.cancelled().await; tokio::time::sleep(GRACE).await } => {

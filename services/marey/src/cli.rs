@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    bench, cmu, connection::Server, database, demo, evaluate, health, keys, results, run, sample, serve,
+    bench, cmu, connection::Server, database, demo, evaluate, health, keys, live, results, run, sample, serve,
     status, up, upload,
 };
 
@@ -44,6 +44,7 @@ enum Command {
     Results(results::Args),
     Status(status::Args),
     Cancel(status::CancelArgs),
+    Live(live::Args),
     /// Measure how well motion is reconstructed, on recordings of your own
     Evaluate(evaluate::Args),
     /// Measure how fast the parts are, on recordings of your own
@@ -78,6 +79,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Results(args) => results::run(&args),
         Command::Status(args) => status::run(&args),
         Command::Cancel(args) => status::cancel(&args),
+        Command::Live(args) => live::run(&args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Sample(args) => sample::run(&args),

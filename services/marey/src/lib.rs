@@ -13,6 +13,7 @@ mod demo;
 mod evaluate;
 mod health;
 mod keys;
+mod live;
 mod pack;
 mod results;
 mod run;

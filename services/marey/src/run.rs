@@ -107,7 +107,8 @@ fn request(args: &Args) -> anyhow::Result<Value> {
     Ok(request)
 }
 
-fn pairs(given: &[String], value: impl Fn(&str) -> Value) -> anyhow::Result<Value> {
+/// What `NAME=VALUE` options say.
+pub fn pairs(given: &[String], value: impl Fn(&str) -> Value) -> anyhow::Result<Value> {
     given
         .iter()
         .map(|pair| {

@@ -8,8 +8,8 @@ use service::config::{TelemetryConfig, Variables, environment};
 pub enum Service {
     /// The HTTP interface
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:8080), MAREY_MAX_UPLOAD_BYTES (536870912) and
-    /// MAREY_BOOTSTRAP_KEY may be.
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:8080), MAREY_MAX_UPLOAD_BYTES (536870912),
+    /// MAREY_BOOTSTRAP_KEY and MAREY_RECONSTRUCTION (http://127.0.0.1:50052, where live streams go) may be.
     Gateway,
     /// Builds motion databases and answers queries on them
     ///

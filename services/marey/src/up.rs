@@ -153,6 +153,7 @@ async fn start_services(
 
     let mut config = gateway::Config::new(&database_url, store.clone());
     config.listen = args.listen;
+    let replicas = config.reconstruction.clone();
     let gateway = Gateway::start(&config, shutdown.clone()).await?;
     let api_key = api_key(data_dir, &database_url).await?;
 
@@ -162,6 +163,7 @@ async fn start_services(
     config.worker.shutdown_grace = GRACE;
     config.worker.concurrency = args.workers.unwrap_or(config.worker.concurrency);
     let reconstruction = reconstruction::start(config.clone(), shutdown.clone()).await?;
+    replicas.set(reconstruction.address);
     let motion_index = motion_index::start(config, shutdown).await?;
 
     let server =

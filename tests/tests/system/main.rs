@@ -5,6 +5,7 @@ mod command;
 mod downloads;
 mod faults;
 mod interface;
+mod live;
 mod runs;
 mod uploads;
 

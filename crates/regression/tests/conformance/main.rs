@@ -19,7 +19,7 @@ type Maker<'a> = (&'static str, Box<dyn Fn(usize, usize) -> Box<dyn Predictor + 
 /// Every method. `model`, of poses of as many numbers as the targets, is that of the last.
 fn methods(model: &regression::gplvm::Gplvm) -> Vec<Maker<'_>> {
     vec![
-        ("local-regression", Box::new(|width, dofs| Box::new(LocalRegression::new(MOST, width, dofs)))),
+        ("local-regression", Box::new(|_, dofs| Box::new(LocalRegression::new(MOST, dofs)))),
         ("nearest", Box::new(|_, _| Box::new(NearestExample))),
         ("lpca", Box::new(|_, dofs| Box::new(LocalPca::new(MOST, dofs, LpcaParameters::default())))),
         (

@@ -6,6 +6,7 @@ mod databases;
 mod download;
 mod events;
 mod files;
+pub(crate) mod live;
 mod lookup;
 mod me;
 mod operations;
@@ -47,6 +48,7 @@ pub(crate) fn described() -> OpenApiRouter<App> {
         .routes(routes!(runs::show))
         .routes(routes!(runs::cancel))
         .routes(routes!(events::watch))
+        .routes(routes!(live::follow))
         .routes(routes!(results::list))
         .routes(routes!(results::get))
         .routes(routes!(operations::healthz))

@@ -84,20 +84,8 @@ impl NewReconstruction {
         }
     }
 
-    /// All parameters of the method, those left out with their defaults. Without a skeleton of the performer's own the
-    /// database's is borrowed, and whose clips have one like it says nothing: they are not preferred.
     fn resolve(&self, has_own_skeleton: bool) -> Result<Value> {
-        let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
-        let mut given = self.given()?;
-        if !has_own_skeleton {
-            for name in ["skeleton_weight", "start_skeleton_weight"] {
-                given.entry(name).or_insert(Value::from(0.0));
-            }
-        }
-        let parameters: sparse::Parameters =
-            serde_json::from_value(Value::Object(given)).map_err(|error| refuse(&error))?;
-        parameters.check().map_err(|error| refuse(&error))?;
-        Ok(serde_json::to_value(&parameters)?)
+        resolve_parameters(self.given()?, has_own_skeleton)
     }
 
     fn given(&self) -> Result<Map<String, Value>> {
@@ -116,6 +104,21 @@ impl NewReconstruction {
         }
         Ok(given)
     }
+}
+
+/// All parameters of the method, those left out with their defaults. Without a skeleton of the performer's own the
+/// database's is borrowed, and whose clips have one like it says nothing: they are not preferred.
+pub(super) fn resolve_parameters(mut given: Map<String, Value>, has_own_skeleton: bool) -> Result<Value> {
+    let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
+    if !has_own_skeleton {
+        for name in ["skeleton_weight", "start_skeleton_weight"] {
+            given.entry(name).or_insert(Value::from(0.0));
+        }
+    }
+    let parameters: sparse::Parameters =
+        serde_json::from_value(Value::Object(given)).map_err(|error| refuse(&error))?;
+    parameters.check().map_err(|error| refuse(&error))?;
+    Ok(serde_json::to_value(&parameters)?)
 }
 
 /// Reconstruct a session's motion

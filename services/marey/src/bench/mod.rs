@@ -1,6 +1,7 @@
 //! `marey bench`: how fast the parts are, on motion of your own.
 
 mod reconstruct;
+mod live;
 mod search;
 
 /// `marey bench`
@@ -15,6 +16,7 @@ enum What {
     Reconstruct(Box<reconstruct::Args>),
     /// Search windows of held-out motion in a database: exact beside fast
     Search(Box<search::Args>),
+    Live(Box<live::Args>),
 }
 
 /// Runs `marey bench`.
@@ -22,5 +24,6 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     match args.what {
         What::Reconstruct(args) => reconstruct::run(&args),
         What::Search(args) => search::run(&args),
+        What::Live(args) => live::run(&args),
     }
 }

@@ -99,10 +99,12 @@ pub(super) async fn open(
     let thread = std::thread::Builder::new().name("live".to_owned());
     thread
         .spawn(move || {
-            // Until here nobody else may have the slot.
-            let _slot = slot;
-            let _closed = Closed(&work);
-            compute(&start, &work, begun, why);
+            let closed = Closed(&work);
+            let last = compute(&start, &work, begun, why);
+            // Who has heard the last word finds the slot free.
+            drop(slot);
+            work.answers.finish(last);
+            drop(closed);
         })
         .map_err(CallError::NoThread)?;
     // A thread that is gone without a word has panicked.
@@ -241,31 +243,31 @@ impl Reader {
     }
 }
 
-/// The thread: all that is computed.
+/// The thread: all that is computed. What is to be said last.
 fn compute(
     start: &Start,
     channel: &Channel,
     begun: oneshot::Sender<Result<(), sparse::Error>>,
     why: oneshot::Receiver<Status>,
-) {
+) -> Vec<Answer> {
     let Start { prior, session, parameters, table, .. } = start;
     let made = Reconstructor::with_table(&prior.database, &prior.index, session, parameters, table.clone());
     let reconstructor = match made {
         Ok(reconstructor) => reconstructor,
-        Err(error) => return drop(begun.send(Err(error))),
+        Err(error) => return refused(begun, error),
     };
     let mut live = match Live::new(&reconstructor) {
         Ok(live) => live,
-        Err(error) => return drop(begun.send(Err(error))),
+        Err(error) => return refused(begun, error),
     };
     let is_resumed = !start.state.is_empty();
     if is_resumed && let Err(error) = live.resume(&start.state) {
-        return drop(begun.send(Err(error)));
+        return refused(begun, error);
     }
     // Whoever waits for this may be gone; the queues are closed then.
     let _ = begun.send(Ok(()));
     if channel.put_answer(live_response::Message::Started(started(start, is_resumed))).is_err() {
-        return;
+        return Vec::new();
     }
     let mut last = 0;
     let mut since_state = 0;
@@ -280,12 +282,21 @@ fn compute(
             put = put.and_then(|()| channel.put_answer(state(&live, last)));
         }
         if put.is_err() {
-            return;
+            return Vec::new();
         }
     }
     let end = why.blocking_recv().unwrap_or_else(|_| Status::cancelled("the client is gone"));
-    let last = Ok(v1::LiveResponse { message: Some(state(&live, last)) });
-    channel.answers.finish([last].into_iter().chain((end.code() != tonic::Code::Ok).then_some(Err(end))));
+    let mut answers = vec![Ok(v1::LiveResponse { message: Some(state(&live, last)) })];
+    if end.code() != tonic::Code::Ok {
+        answers.push(Err(end));
+    }
+    answers
+}
+
+fn refused(begun: oneshot::Sender<Result<(), sparse::Error>>, error: sparse::Error) -> Vec<Answer> {
+    // Whoever waits for this may be gone.
+    let _ = begun.send(Err(error));
+    Vec::new()
 }
 
 fn started(start: &Start, is_resumed: bool) -> v1::LiveStarted {
