@@ -115,7 +115,7 @@ pub struct MemoryConfig {
     /// Unpacked motion files of one motion database, bytes. Default 8 GiB: all of the CMU library is 5.
     pub max_input_bytes: u64,
     /// What one job of building a motion database keeps in memory, bytes: an archive unpacked, or an index file and its
-    /// poses. Default 2 GiB: 4 million poses of 62 numbers.
+    /// poses. Default 2 GiB: 2 million poses of 62 numbers.
     pub max_build_bytes: u64,
     /// Frames of one session at 60 a second. Default 432 000, two hours: putting it together takes about 4 kB a frame.
     pub max_session_frames: usize,

@@ -15,8 +15,10 @@ pub mod objects;
 mod server;
 pub mod shutdown;
 pub mod telemetry;
+mod threads;
 
 pub use cache::Cache;
 pub use config::Config;
 pub use error::Error;
 pub use server::{Parts, Running, start};
+pub use threads::AllCores;

@@ -2,10 +2,10 @@
 
 use crate::compute;
 use bytes::Bytes;
-use motion_db::MotionDatabase;
+use motion_db::{IndexFile, MotionDatabase, WindowIndex};
 use queue::JobError;
 use serde::{Deserialize, Serialize};
-use std::str::FromStr;
+use std::{str::FromStr, sync::Arc};
 use store::{Key, Store};
 
 /// Name of an index file that is a whole database.
@@ -51,11 +51,22 @@ pub struct ShardedClip {
     pub shard: usize,
 }
 
+/// A database that was read, with the windows that its index file holds, if it is one file that holds any.
+#[derive(Debug, Clone)]
+pub struct Opened {
+    /// The database.
+    pub database: Arc<MotionDatabase>,
+    /// Its windows, of the length that they were written with.
+    pub windows: Option<Arc<WindowIndex>>,
+    /// What it takes, bytes: of a file that is used where it lies, its size.
+    pub bytes: u64,
+}
+
 /// What the row of a database names.
 #[derive(Debug, Clone)]
 pub enum Index {
-    /// The index file itself.
-    Whole(Bytes),
+    /// The index file itself: it is a shard that is alone.
+    Whole(Shard),
     /// The list of its shards.
     Sharded(ShardList),
 }
@@ -70,6 +81,14 @@ pub enum Error {
     /// A file is not an index file, or shards do not belong together.
     #[error(transparent)]
     Database(#[from] motion_db::Error),
+    /// An index file in a folder can't be mapped.
+    #[error("{key} can't be mapped into memory: {source}")]
+    Map {
+        /// The file's key.
+        key: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
     /// The list of shards is none.
     #[error("the list of shards {0}, expected one that agrees with its shards")]
     List(String),
@@ -80,6 +99,7 @@ impl Error {
     /// not what was written, may pass by itself.
     pub fn of_job(self, name: &str) -> JobError {
         match &self {
+            Self::Map { .. } => JobError::retry(self),
             Self::Store(e) if e.is_transient() || matches!(e, store::Error::Corrupt { .. }) => {
                 JobError::retry(self)
             }
@@ -91,17 +111,20 @@ impl Error {
     }
 }
 
-/// Reads the index file or the list of shards of a database, checked against its BLAKE3.
+/// Reads which index file or files a database has.
 ///
 /// # Errors
-/// [`Error::Store`], also for one of more than `max_bytes`; [`Error::List`].
+/// [`Error::Store`], also for a list of more than `max_bytes`; [`Error::List`].
 pub async fn read(store: &Store, store_key: &str, blake3: &str, max_bytes: u64) -> Result<Index, Error> {
-    let bytes = store.get_checked(&Key::from_str(store_key)?, blake3, max_bytes).await?;
-    if bytes.first() != Some(&LIST) {
-        return Ok(Index::Whole(bytes));
+    let key = Key::from_str(store_key)?;
+    let bytes = store.size(&key).await?;
+    if store.get_range(&key, 0..1).await?.first() != Some(&LIST) {
+        let (store_key, blake3) = (store_key.to_owned(), blake3.to_owned());
+        return Ok(Index::Whole(Shard { store_key, bytes, blake3 }));
     }
+    let list = store.get_checked(&key, blake3, max_bytes).await?;
     let list: ShardList =
-        serde_json::from_slice(&bytes).map_err(|e| Error::List(format!("does not parse ({e})")))?;
+        serde_json::from_slice(&list).map_err(|e| Error::List(format!("does not parse ({e})")))?;
     match list.clips.iter().find(|clip| clip.shard >= list.shards.len()) {
         Some(clip) => Err(Error::List(format!("has clip {:?} in a shard that is not there", clip.name))),
         None => Ok(Index::Sharded(list)),
@@ -109,28 +132,42 @@ pub async fn read(store: &Store, store_key: &str, blake3: &str, max_bytes: u64) 
 }
 
 impl Shard {
-    /// Reads and opens the shard.
+    /// Opens the index file: mapped, where the store is a folder, else read. Every section is checked.
     ///
     /// # Errors
-    /// [`Error::Store`], also for one of more than `max_bytes`; [`Error::Database`].
-    pub async fn open(&self, store: &Store, max_bytes: u64) -> Result<MotionDatabase, Error> {
-        let bytes = store.get_checked(&Key::from_str(&self.store_key)?, &self.blake3, max_bytes).await?;
-        Ok(compute::run(move || MotionDatabase::from_bytes(&bytes)).await?)
+    /// [`Error::Store`], also for one of more than `max_bytes`; [`Error::Database`]; [`Error::Map`].
+    pub async fn open(&self, store: &Store, max_bytes: u64) -> Result<Opened, Error> {
+        let key = Key::from_str(&self.store_key)?;
+        let found = store.size(&key).await?;
+        if found > max_bytes {
+            return Err(store::Error::TooLarge { key, limit_bytes: max_bytes }.into());
+        }
+        let bytes = match store.path(&key) {
+            Some(path) => {
+                let mapped = compute::run(move || mapped_file::map(&path)).await;
+                mapped.map_err(|source| Error::Map { key: self.store_key.clone(), source })?
+            }
+            None => store.get_checked(&key, &self.blake3, max_bytes).await?,
+        };
+        compute::run(move || opened(bytes)).await
     }
 }
 
-/// Reads a whole database, its shards put together: the same, bit for bit, as if it had been built undivided.
+fn opened(bytes: Bytes) -> Result<Opened, Error> {
+    let file = IndexFile::open(bytes)?;
+    file.verify()?;
+    let bytes = file.num_bytes() as u64;
+    let (database, windows) = file.into_parts();
+    Ok(Opened { database: database.into(), windows: windows.map(Arc::new), bytes })
+}
+
+/// Opens a whole database, its shards put together: the same, bit for bit, as if it had been built undivided.
 ///
 /// # Errors
-/// As [`read`]; [`Error::Database`]. No file, nor all together, may have more than `max_bytes`.
-pub async fn open(
-    store: &Store,
-    store_key: &str,
-    blake3: &str,
-    max_bytes: u64,
-) -> Result<MotionDatabase, Error> {
+/// As [`read`] and [`Shard::open`]. No file, nor all together, may have more than `max_bytes`.
+pub async fn open(store: &Store, store_key: &str, blake3: &str, max_bytes: u64) -> Result<Opened, Error> {
     let list = match read(store, store_key, blake3, max_bytes).await? {
-        Index::Whole(bytes) => return Ok(compute::run(move || MotionDatabase::from_bytes(&bytes)).await?),
+        Index::Whole(file) => return file.open(store, max_bytes).await,
         Index::Sharded(list) => list,
     };
     let total: u64 = list.shards.iter().map(|shard| shard.bytes).sum();
@@ -140,13 +177,15 @@ pub async fn open(
     }
     let mut shards = Vec::with_capacity(list.shards.len());
     for shard in &list.shards {
-        shards.push(shard.open(store, max_bytes).await?);
+        shards.push(shard.open(store, max_bytes).await?.database);
     }
-    compute::run(move || put_together(&list, &shards)).await
+    let database = compute::run(move || put_together(&list, &shards)).await?;
+    let bytes = (database.num_poses() * database.num_dofs() * size_of::<f32>()) as u64;
+    Ok(Opened { database: database.into(), windows: None, bytes })
 }
 
 /// The database of which `shards` are the parts.
-fn put_together(list: &ShardList, shards: &[MotionDatabase]) -> Result<MotionDatabase, Error> {
+fn put_together(list: &ShardList, shards: &[Arc<MotionDatabase>]) -> Result<MotionDatabase, Error> {
     let first = shards.first().ok_or_else(|| Error::List("is empty".to_owned()))?;
     let mut whole = first.emptied();
     let mut taken = vec![0; shards.len()];

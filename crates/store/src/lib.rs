@@ -28,12 +28,14 @@ pub use location::Location;
 pub use write::{Stored, UploadLimits};
 
 use object_store::{ObjectStore, local::LocalFileSystem};
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 /// A handle on the object store; cheap to clone, shared by all tasks of a process.
 #[derive(Debug, Clone)]
 pub struct Store {
     backend: Arc<dyn ObjectStore>,
+    /// of a store that is a folder
+    folder: Option<PathBuf>,
 }
 
 impl Store {
@@ -51,9 +53,16 @@ impl Store {
                     // A row in PostgreSQL that names an object must never outlive the object in a power cut.
                     .with_fsync(true)
                     .with_automatic_cleanup(true);
-                Ok(Self { backend: Arc::new(backend) })
+                let folder = path.canonicalize().map_err(|e| refuse(e.to_string()))?;
+                Ok(Self { backend: Arc::new(backend), folder: Some(folder) })
             }
             Location::S3 { .. } => Err(refuse("this build has no S3 backend; use a shared folder".into())),
         }
+    }
+
+    /// The file that holds an object, where the store is a folder. It may be mapped: objects are written under another
+    /// name, renamed and never changed after. Whether there is one is not looked at.
+    pub fn path(&self, key: &Key) -> Option<PathBuf> {
+        self.folder.as_ref().map(|folder| folder.join(key.as_str()))
     }
 }

@@ -103,7 +103,7 @@ pub struct ShowArgs {
 pub struct TrainArgs {
     /// The database: NAME (its latest version that is ready), NAME@VERSION, or its id
     which: String,
-    /// Parameter of the training: latent_dims=3, active=300 (poses that the model keeps), max_iterations=200
+    /// Parameter of the training: latent_dims=5, active=300 (poses that the model keeps), max_iterations=200
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<String>,
     /// Show the progress and wait until it is trained
@@ -262,7 +262,7 @@ fn train(args: &TrainArgs) -> anyhow::Result<()> {
     let mut parameters = Map::new();
     for set in &args.set {
         let Some((name, value)) = set.split_once('=') else {
-            bail!("--set {set}: expected NAME=VALUE, such as latent_dims=3");
+            bail!("--set {set}: expected NAME=VALUE, such as latent_dims=4");
         };
         parameters.insert(name.to_owned(), serde_json::from_str(value).unwrap_or_else(|_| value.into()));
     }

@@ -34,7 +34,7 @@ pub struct Args {
     /// Metres of one unit of BVH files [default: 0.01, centimetres]
     #[arg(long, value_name = "METRES")]
     bvh_unit: Option<f64>,
-    /// local-regression, or nearest for a plain baseline [default: local-regression]
+    /// local-regression, nearest, lpca, lpcr or gplvm [default: local-regression]; docs/methods.md
     #[arg(long)]
     method: Option<String>,
     /// Frames of history to look at

@@ -12,15 +12,21 @@ use motion_db::MotionDatabase;
 use queue::{Handler, JobContext, JobError, Outcome};
 use serde::Serialize;
 use service::{
-    compute,
+    AllCores, compute,
     config::MemoryConfig,
     motion_database::{INDEX, SHARDS, Shard, ShardList, ShardedClip},
     objects,
 };
 use sqlx::{PgConnection, PgPool, types::Json};
-use store::{Store, Stored, key};
+use std::io::{BufWriter, Seek};
+use store::{Key, Store, Stored, UploadLimits, key};
+use tokio_util::io::ReaderStream;
 use uuid::Uuid;
 
+/// What writing the windows of a pose takes beside the pose, bytes.
+const WRITING_BYTES: usize = 500;
+/// How much of an index file is in memory on its way to the store, bytes.
+const READ_BYTES: usize = 1 << 20;
 /// Result that says what went into the database.
 const SUMMARY: &str = "summary.json";
 
@@ -108,9 +114,8 @@ impl BuildHandler {
             let database = self.gather(job, payload, sources, &shard_of, (shard, num_shards)).await?;
             let (skeleton, num_dofs) = (database.skeleton().clone(), database.num_dofs());
             job.progress((shard as f64 + 0.9) / num_shards as f64, "writing the index");
-            let bytes = compute::run(move || database.to_bytes()).await;
             let name = if num_shards == 1 { INDEX.to_owned() } else { format!("{shard:03}.mdb") };
-            stored.push(self.put(job, payload, &name, bytes).await?);
+            stored.push(self.put_index(job, payload, &name, database).await?);
             last = Some((skeleton, num_dofs));
         }
         let Some((skeleton, num_dofs)) = last else { return Err(JobError::retry("no shard was written")) };
@@ -166,14 +171,14 @@ impl BuildHandler {
         gathered.ok_or_else(|| JobError::retry("a shard without clips"))
     }
 
-    /// Poses and the index file made of them are in memory together.
+    /// Poses, which may take twice their size while more are added, and what writing their windows takes.
     fn check_memory(
         &self,
         num_poses: usize,
         num_dofs: usize,
         payload: &BuildMotionDatabase,
     ) -> Result<(), JobError> {
-        let needed = (2 * num_poses * num_dofs * size_of::<f32>()) as u64;
+        let needed = (num_poses * (2 * num_dofs * size_of::<f32>() + WRITING_BYTES)) as u64;
         let limit = self.memory.max_build_bytes;
         if needed <= limit {
             return Ok(());
@@ -187,6 +192,34 @@ impl BuildHandler {
         Err(JobError::give_up(message, "or raise MAREY_MAX_BUILD_BYTES"))
     }
 
+    /// Writes an index file with its windows, by way of a file: it is several times as large as the database.
+    async fn put_index(
+        &self,
+        job: &JobContext,
+        payload: &BuildMotionDatabase,
+        name: &str,
+        database: MotionDatabase,
+    ) -> Result<Stored, JobError> {
+        let file = compute::run(move || -> Result<std::fs::File, JobError> {
+            let mut out = BufWriter::new(tempfile::tempfile().map_err(JobError::retry)?);
+            let window = sparse::Parameters::default().window;
+            motion_db::write_index(&database, Some(window), &AllCores, &mut out)
+                .map_err(|e| no_database(&e))?;
+            let mut file = out.into_inner().map_err(JobError::retry)?;
+            file.rewind().map_err(JobError::retry)?;
+            Ok(file)
+        });
+        let file = ReaderStream::with_capacity(tokio::fs::File::from_std(file.await?), READ_BYTES);
+        let limits = UploadLimits { max_bytes: u64::MAX, expected_blake3: None };
+        let key = self.key(job, payload, name)?;
+        self.store.put_stream(&key, file, &limits).await.map_err(JobError::retry)
+    }
+
+    fn key(&self, job: &JobContext, payload: &BuildMotionDatabase, name: &str) -> Result<Key, JobError> {
+        let id = payload.motion_database.id;
+        key::motion_database(id, job.id().0, job.lease_number().0, name).map_err(JobError::retry)
+    }
+
     async fn put(
         &self,
         job: &JobContext,
@@ -194,9 +227,7 @@ impl BuildHandler {
         name: &str,
         bytes: Vec<u8>,
     ) -> Result<Stored, JobError> {
-        let id = payload.motion_database.id;
-        let key =
-            key::motion_database(id, job.id().0, job.lease_number().0, name).map_err(JobError::retry)?;
+        let key = self.key(job, payload, name)?;
         self.store.put(&key, bytes.into()).await.map_err(JobError::retry)
     }
 }

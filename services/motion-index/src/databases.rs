@@ -3,24 +3,24 @@
 use crate::{Error, catalogue, catalogue::Row, search};
 use motion_db::{MotionDatabase, WindowIndex};
 use service::{
-    Cache, compute,
+    AllCores, Cache, compute,
     config::MemoryConfig,
-    motion_database::{self, Index, ShardList},
+    motion_database::{self, Index, Opened, ShardList},
 };
 use sqlx::PgPool;
 use std::sync::Arc;
 use store::Store;
 use uuid::Uuid;
 
-/// Share of the bound that goes to databases themselves; the rest is for indexes and point tables. An index of
-/// windows of m frames is m times as large as its database, a table of points is smaller.
-const DATABASE_SHARE: f64 = 0.25;
+/// Share of the bound that goes to databases, with the windows that their files hold; the rest is for windows of other
+/// lengths and point tables.
+const DATABASE_SHARE: f64 = 0.75;
 
 pub(crate) struct Databases {
     pool: PgPool,
     store: Store,
     lists: Cache<Uuid, Option<ShardList>>,
-    databases: Cache<Part, MotionDatabase>,
+    databases: Cache<Part, Opened>,
     derived: Cache<DerivedKey, Derived>,
 }
 
@@ -85,10 +85,10 @@ impl Databases {
         row: &Row,
         list: &Option<ShardList>,
         shard: Option<usize>,
-    ) -> Result<Arc<MotionDatabase>, Error> {
+    ) -> Result<Arc<Opened>, Error> {
         let limit = self.databases.capacity_bytes();
         let load = async {
-            let database = match (list, shard) {
+            let opened = match (list, shard) {
                 (None, _) => motion_database::open(&self.store, &row.store_key, &row.blake3, limit).await?,
                 (Some(list), Some(shard)) if shard < list.shards.len() => {
                     list.shards[shard].open(&self.store, limit).await?
@@ -98,9 +98,9 @@ impl Databases {
                     return Err(Error::NoSuchShard { found, num_shards: list.shards.len() });
                 }
             };
-            let size = (database.num_poses() * database.num_dofs() * size_of::<f32>()) as u64;
-            tracing::info!(database.id = %row.id, shard, num_poses = database.num_poses(), "motion database loaded");
-            Ok::<_, Error>((database, size))
+            let (bytes, num_poses) = (opened.bytes, opened.database.num_poses());
+            tracing::info!(database.id = %row.id, shard, num_poses, "motion database loaded");
+            Ok::<_, Error>((opened, bytes))
         };
         let part = Part { database: row.id, shard: shard.filter(|_| list.is_some()) };
         self.databases.get_or_load(part, load).await
@@ -110,14 +110,17 @@ impl Databases {
     pub async fn nearest_windows(
         &self,
         part: Part,
-        database: Arc<MotionDatabase>,
+        opened: &Opened,
         question: search::WindowQuestion,
     ) -> Result<Vec<search::Match>, Error> {
-        let window = question.num_frames();
+        let (database, window) = (opened.database.clone(), question.num_frames());
+        if let Some(index) = opened.windows.clone().filter(|index| index.window() == window) {
+            return compute::run(move || search::nearest_windows(&database, &index, &question)).await;
+        }
         let key = DerivedKey::Windows { part, window };
         let derived = self.derived(key, search::window_bytes(&database, window), "the index of windows", {
             let database = database.clone();
-            move || Ok(Derived::Windows(WindowIndex::new(&database, window)?))
+            move || Ok(Derived::Windows(WindowIndex::with_threads(&database, window, &AllCores)?))
         });
         let derived = derived.await?;
         compute::run(move || match &*derived {

@@ -97,17 +97,18 @@ impl Question for v1::NearestWindowsRequest {
     async fn ask_here(&self, fan_out: &FanOut, part: Part) -> Result<Vec<Match>, Error> {
         let databases = &fan_out.databases;
         let (row, list) = databases.find(part.database).await?;
-        let database = databases.open(&row, &list, part.shard).await?;
+        let opened = databases.open(&row, &list, part.shard).await?;
+        let database = &opened.database;
         let values = proto::poses::window(&self.window, database.num_dofs())?;
         let question = WindowQuestion::new(values, database.num_dofs(), self.num_matches());
         if let Some(list) = &*list
-            && search::is_too_short(&database, question.num_frames())
+            && search::is_too_short(database, question.num_frames())
             && list.clips.iter().any(|clip| clip.num_poses > question.num_frames())
         {
             // Other shards have clips that are long enough.
             return Ok(Vec::new());
         }
-        databases.nearest_windows(part, database, question).await
+        databases.nearest_windows(part, &opened, question).await
     }
 
     async fn ask_peer(
@@ -139,7 +140,7 @@ impl Question for v1::FindPosesByControlPointsRequest {
         let frame = self.control_points.clone().ok_or(proto::Error::Missing { field: "control_points" })?;
         let points = proto::points::trajectories(&[frame], motion_db::FRAME_RATE)?;
         let (row, list) = databases.find(part.database).await?;
-        let database = databases.open(&row, &list, part.shard).await?;
+        let database = databases.open(&row, &list, part.shard).await?.database.clone();
         databases.nearest_poses(part, database, PointQuestion::new(points, self.num_matches())).await
     }
 

@@ -9,7 +9,8 @@ use formats::archive::Entry;
 use motion_db::MotionDatabase;
 use payloads::{MotionDatabaseFile, Object, PLAN_MOTION_DATABASE, PlanMotionDatabase};
 use queue::{Artefact, ChildJob, Handler, JobContext, JobError, Outcome};
-use service::{compute, config::MemoryConfig, motion_database, objects};
+use service::{compute, config::MemoryConfig, motion_database, motion_database::Index, objects};
+use std::sync::Arc;
 use store::Store;
 
 /// Most motion files of a part.
@@ -182,7 +183,7 @@ impl PlanHandler {
         job: &JobContext,
         divided: &Divided,
         bvh_metres_per_unit: f64,
-    ) -> Result<MotionDatabase, JobError> {
+    ) -> Result<Arc<MotionDatabase>, JobError> {
         // Of every stretch of files the largest: it surely is long enough.
         let stretch = divided.motions.len().div_ceil(SAMPLE_CLIPS).max(1);
         let chosen: Vec<&Place> = divided
@@ -208,22 +209,22 @@ impl PlanHandler {
             })
             .await?;
         }
-        compute::run(move || MotionDatabase::build(&clips)).await.map_err(|e| no_database(&e))
+        let built = compute::run(move || MotionDatabase::build(&clips)).await;
+        Ok(built.map_err(|e| no_database(&e))?.into())
     }
 
-    async fn base(&self, base: &MotionDatabaseFile) -> Result<MotionDatabase, JobError> {
-        use motion_database::Index;
+    async fn base(&self, base: &MotionDatabaseFile) -> Result<Arc<MotionDatabase>, JobError> {
         let most = self.memory.max_build_bytes;
         let read = async {
-            match motion_database::read(&self.store, &base.store_key, &base.blake3, most).await? {
-                Index::Whole(bytes) => Ok(compute::run(move || MotionDatabase::from_bytes(&bytes)).await?),
-                Index::Sharded(list) => match list.shards.first() {
-                    Some(shard) => shard.open(&self.store, most).await,
-                    None => Err(motion_database::Error::List("is empty".to_owned())),
-                },
-            }
+            // All shards have the same coordinates.
+            let shard = match motion_database::read(&self.store, &base.store_key, &base.blake3, most).await? {
+                Index::Whole(file) => Some(file),
+                Index::Sharded(list) => list.shards.into_iter().next(),
+            };
+            let shard = shard.ok_or_else(|| motion_database::Error::List("is empty".to_owned()))?;
+            shard.open(&self.store, most).await
         };
-        read.await.map_err(|error| error.of_job(&full_name(base)))
+        Ok(read.await.map_err(|error| error.of_job(&full_name(base)))?.database)
     }
 }
 

@@ -53,8 +53,8 @@ impl MotionIndex for Rpc {
         let databases = &self.fan_out.databases;
         let (row, list) = databases.find(id).await?;
         // All shards have the same skeleton.
-        let database = databases.open(&row, &list, list.is_some().then_some(0)).await?;
-        Ok(Response::new(describe(&row, &list, &database)))
+        let opened = databases.open(&row, &list, list.is_some().then_some(0)).await?;
+        Ok(Response::new(describe(&row, &list, &opened.database)))
     }
 
     async fn nearest_windows(

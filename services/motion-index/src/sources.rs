@@ -10,7 +10,7 @@ use motion_db::{MotionDatabase, trial_of};
 use queue::{Artefact, JobContext, JobError};
 use service::{compute, motion_database, motion_database::Shard};
 use sqlx::PgPool;
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, sync::Arc};
 use store::Store;
 
 /// A file that holds clips in the coordinates of the database.
@@ -77,15 +77,12 @@ impl Sources {
         let failed = |error: motion_database::Error| error.of_job(&full_name(base));
         let shards = match motion_database::read(store, &base.store_key, &base.blake3, max_bytes).await {
             Err(error) => return Err(failed(error)),
-            Ok(Index::Whole(bytes)) => {
-                let (store_key, blake3) = (base.store_key.clone(), base.blake3.clone());
-                vec![Shard { store_key, bytes: bytes.len() as u64, blake3 }]
-            }
+            Ok(Index::Whole(file)) => vec![file],
             Ok(Index::Sharded(list)) => list.shards,
         };
         let without: BTreeSet<&str> = payload.without.iter().map(String::as_str).collect();
         for shard in shards {
-            let database = shard.open(store, max_bytes).await.map_err(failed)?;
+            let database = shard.open(store, max_bytes).await.map_err(failed)?.database;
             for (index, clip) in database.clips().iter().enumerate() {
                 if without.contains(clip.name.as_str()) || without.contains(trial_of(&clip.name)) {
                     continue;
@@ -126,15 +123,17 @@ impl Sources {
         store: &Store,
         payload: &BuildMotionDatabase,
         max_bytes: u64,
-    ) -> Result<MotionDatabase, JobError> {
+    ) -> Result<Arc<MotionDatabase>, JobError> {
         match (&self.files[source], &payload.base) {
             (Source::Base(shard), Some(base)) => {
-                shard.open(store, max_bytes).await.map_err(|error| error.of_job(&full_name(base)))
+                let opened = shard.open(store, max_bytes).await;
+                Ok(opened.map_err(|error| error.of_job(&full_name(base)))?.database)
             }
             (Source::Base(_), None) => Err(JobError::retry("an index file of no base")),
             (Source::Part(artefact), _) => {
                 let bytes = read_artefact(store, artefact).await?;
-                compute::run(move || MotionDatabase::from_bytes(&bytes)).await.map_err(JobError::retry)
+                let part = compute::run(move || MotionDatabase::from_bytes(&bytes)).await;
+                Ok(part.map_err(JobError::retry)?.into())
             }
         }
     }

@@ -37,9 +37,8 @@ impl Handler for TrainHandler {
             .map_err(|e| JobError::give_up(format!("parameters: {e}"), ""))?;
         job.progress(0.0, "reading the motion database");
         let most = self.memory.database_cache_bytes;
-        let database = motion_database::open(&self.store, &file.store_key, &file.blake3, most)
-            .await
-            .map_err(|error| error.of_job(&full_name(file)))?;
+        let opened = motion_database::open(&self.store, &file.store_key, &file.blake3, most).await;
+        let database = opened.map_err(|error| error.of_job(&full_name(file)))?.database;
         let of = job.clone();
         let model = compute::run(move || {
             let mut progress = |done: usize, planned: usize| {

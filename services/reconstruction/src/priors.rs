@@ -4,14 +4,19 @@ use crate::payload::{MotionDatabaseFile, Object};
 use motion_db::{MotionDatabase, WindowIndex};
 use queue::JobError;
 use regression::gplvm::Gplvm;
-use service::{Cache, compute, config::MemoryConfig, motion_database, objects};
+use service::{
+    AllCores, Cache, compute,
+    config::MemoryConfig,
+    motion_database::{self, Opened},
+    objects,
+};
 use sparse::{Parameters, Reconstructor, Session};
 use std::sync::Arc;
 use store::Store;
 
-/// Share of the bound that goes to databases; the rest is for indexes, which are as many times larger as their
-/// windows are long.
-const DATABASE_SHARE: f64 = 0.25;
+/// Share of the bound that goes to databases, with the windows that their files hold; the rest is for windows of other
+/// lengths.
+const DATABASE_SHARE: f64 = 0.75;
 
 /// A database and its index of windows.
 #[derive(Debug, Clone)]
@@ -46,7 +51,7 @@ const MAX_MODEL_BYTES: u64 = 64 << 20;
 pub(crate) struct Priors {
     store: Store,
     /// by checksum: a database never changes
-    databases: Cache<String, MotionDatabase>,
+    databases: Cache<String, Opened>,
     /// by checksum and length of the windows, frames
     indexes: Cache<(String, usize), WindowIndex>,
     /// by checksum
@@ -69,18 +74,17 @@ impl Priors {
     /// # Errors
     /// Gives up if the file is gone, not a database, or too large for this service.
     pub async fn database(&self, file: &MotionDatabaseFile) -> Result<Arc<MotionDatabase>, JobError> {
-        let name = format!("{}@{}", file.name, file.version);
+        Ok(self.open(file).await?.database.clone())
+    }
+
+    async fn open(&self, file: &MotionDatabaseFile) -> Result<Arc<Opened>, JobError> {
         let load = async {
             let limit = self.databases.capacity_bytes();
-            let database = motion_database::open(&self.store, &file.store_key, &file.blake3, limit).await;
-            let database = database.map_err(|error| error.of_job(&name))?;
-            let bytes = (database.num_poses() * database.num_dofs() * size_of::<f32>()) as u64;
-            tracing::info!(
-                database.name = file.name,
-                num_poses = database.num_poses(),
-                "motion database loaded"
-            );
-            Ok::<_, JobError>((database, bytes))
+            let opened = motion_database::open(&self.store, &file.store_key, &file.blake3, limit).await;
+            let opened = opened.map_err(|error| error.of_job(&format!("{}@{}", file.name, file.version)))?;
+            let (bytes, num_poses) = (opened.bytes, opened.database.num_poses());
+            tracing::info!(database.name = file.name, num_poses, "motion database loaded");
+            Ok::<_, JobError>((opened, bytes))
         };
         self.databases.get_or_load(file.blake3.clone(), load).await
     }
@@ -90,7 +94,25 @@ impl Priors {
     /// # Errors
     /// As [`Self::database`], and if the window does not fit the database.
     pub async fn get(&self, file: &MotionDatabaseFile, window: usize) -> Result<Prior, JobError> {
-        let database = self.database(file).await?;
+        let opened = self.open(file).await?;
+        let index = match opened.windows.as_ref().filter(|windows| windows.window() == window) {
+            Some(windows) => windows.clone(),
+            None => self.index(file, &opened.database, window).await?,
+        };
+        let gplvm = match &file.gplvm {
+            Some(model) => Some(self.gplvm(model).await?),
+            None => None,
+        };
+        Ok(Prior { database: opened.database.clone(), index, gplvm })
+    }
+
+    /// Windows that the index file does not hold.
+    async fn index(
+        &self,
+        file: &MotionDatabaseFile,
+        database: &Arc<MotionDatabase>,
+        window: usize,
+    ) -> Result<Arc<WindowIndex>, JobError> {
         let numbers = database.num_poses() * (window * database.num_dofs() + 17);
         let bytes = (numbers * size_of::<f32>()) as u64;
         let limit = self.indexes.capacity_bytes();
@@ -103,19 +125,14 @@ impl Priors {
         }
         let make = {
             let database = database.clone();
-            move || WindowIndex::new(&database, window)
+            move || WindowIndex::with_threads(&database, window, &AllCores)
         };
         let load = async {
             let index =
                 compute::run(make).await.map_err(|e| JobError::give_up(e.to_string(), format!("{e:?}")))?;
             Ok::<_, JobError>((index, bytes))
         };
-        let index = self.indexes.get_or_load((file.blake3.clone(), window), load).await?;
-        let gplvm = match &file.gplvm {
-            Some(model) => Some(self.gplvm(model).await?),
-            None => None,
-        };
-        Ok(Prior { database, index, gplvm })
+        self.indexes.get_or_load((file.blake3.clone(), window), load).await
     }
 
     async fn gplvm(&self, model: &Object) -> Result<Arc<Gplvm>, JobError> {

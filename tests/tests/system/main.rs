@@ -2,6 +2,7 @@
 
 mod access;
 mod command;
+mod databases;
 mod downloads;
 mod faults;
 mod interface;

@@ -78,7 +78,7 @@ fn an_archive_that_is_none_fails_the_build_and_is_named() -> Result<()> {
     assert_eq!(database["state"], "failed");
     let session = crate::session(api, 3, 240)?;
     let refused = api.post(&format!("{session}/runs"), &json!({"motion_database": "broken"}))?;
-    assert_eq!(refused.status, 404, "no version of it is ready");
+    assert_eq!(refused.status, 409, "it is there, and not ready");
     let refused = api.post(&format!("{session}/runs"), &json!({"motion_database": "broken@1"}))?;
     assert_eq!((refused.status, refused.problem().as_str()), (409, "conflict"));
     Ok(())

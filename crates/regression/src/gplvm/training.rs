@@ -65,7 +65,7 @@ pub struct TrainingOptions {
 
 impl Default for TrainingOptions {
     fn default() -> Self {
-        Self { latent_dims: 3, active: 300, max_iterations: 200 }
+        Self { latent_dims: 5, active: 300, max_iterations: 200 }
     }
 }
 
@@ -92,7 +92,7 @@ impl TrainingOptions {
     }
 }
 
-/// Trains a model. `progress` is called with the number of steps done and planned, and may stop it. About 15 ms a step
+/// Trains a model. `progress` is called with the number of steps done and planned, and may stop it. About 20 ms a step
 /// at 300 active poses of 62 numbers; memory is that of the training set and a few matrices of the active set's size.
 ///
 /// # Errors
