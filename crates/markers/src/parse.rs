@@ -13,6 +13,9 @@ const MAX_POINTS: usize = 64;
 const MAX_CHOICES: usize = 8;
 const MAX_GROUP: usize = 32;
 const MAX_MARKERS: usize = 512;
+/// Deepest nesting of brackets, and most dots in a line: more is no map, and would take a reader's stack.
+const MAX_DEPTH: usize = 64;
+const MAX_DOTS: usize = 256;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -60,6 +63,7 @@ impl MarkerMap {
         if text.len() > MAX_BYTES {
             return Err(value("text", format!("{} bytes long", text.len()), "at most 65536 bytes"));
         }
+        check_depth(text)?;
         let file: File =
             toml::from_str(text).map_err(|error| Error::Syntax { message: one_line(text, &error) })?;
         count("number of points", file.points.len(), 1, MAX_POINTS, "1 to 64")?;
@@ -72,6 +76,22 @@ impl MarkerMap {
         let File { name, aliases, description, prefix, markers, .. } = file;
         Ok(Self { name, aliases, description, prefix, markers, points })
     }
+}
+
+fn check_depth(text: &str) -> Result<()> {
+    let mut depth = 0_usize;
+    let mut deepest = 0;
+    for byte in text.bytes() {
+        match byte {
+            b'[' | b'{' => depth += 1,
+            b']' | b'}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        deepest = deepest.max(depth);
+    }
+    count("depth of brackets", deepest, 0, MAX_DEPTH, "at most 64")?;
+    let dots = text.lines().map(|line| line.matches('.').count()).max().unwrap_or(0);
+    count("number of dots in a line", dots, 0, MAX_DOTS, "at most 256")
 }
 
 fn point(name: &str, entry: Entry, sigma_mm: Option<f64>) -> Result<Point> {
