@@ -24,6 +24,12 @@ pub struct PlanSparse {
     pub points: Vec<String>,
     /// name in the file -> name of a control point or joint, for files with marker names of their own
     pub mapping: BTreeMap<String, String>,
+    /// marker set whose names the file has: `auto`, `none` or a preset's name
+    pub marker_set: String,
+    /// text of a marker map (TOML)
+    pub marker_map: Option<String>,
+    /// what the names of the performer's markers begin with
+    pub marker_prefix: Option<String>,
     /// axis of TRC and C3D files that points up, where the file does not say it or says it wrong
     pub up: Option<model::Axis>,
     /// metres of one unit of BVH files

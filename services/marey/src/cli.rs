@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    bench, cmu, connection::Server, database, demo, evaluate, health, keys, live, results, run, sample, serve,
-    status, up, upload,
+    bench, cmu, connection::Server, database, demo, evaluate, health, keys, live, marker_sets, results, run,
+    sample, serve, status, up, upload,
 };
 
 /// Full-body motion from a few control points.
@@ -41,6 +41,7 @@ enum Command {
     Db(database::Command),
     Upload(upload::Args),
     Run(run::Args),
+    Markers(marker_sets::Args),
     Results(results::Args),
     Status(status::Args),
     Cancel(status::CancelArgs),
@@ -76,6 +77,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Db(command) => database::run(&command),
         Command::Upload(args) => upload::run(&args),
         Command::Run(args) => run::run(&args),
+        Command::Markers(args) => marker_sets::run(&args),
         Command::Results(args) => results::run(&args),
         Command::Status(args) => status::run(&args),
         Command::Cancel(args) => status::cancel(&args),

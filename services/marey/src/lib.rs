@@ -14,6 +14,7 @@ mod evaluate;
 mod health;
 mod keys;
 mod live;
+mod marker_sets;
 mod pack;
 mod results;
 mod run;

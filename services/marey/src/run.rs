@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use crate::{
     cli::ServerArgs,
     client::{Client, Run},
-    watch,
+    marker_sets, watch,
 };
 
 /// Reconstruct a session's motion
@@ -14,6 +14,8 @@ use crate::{
 #[command(after_help = "Examples:
   marey run \"take 3\" --database walks --watch
   marey run \"take 3\" --database walks@2 --points left_wrist,right_wrist,left_ankle,right_ankle
+  marey run \"take 3\" --database walks --map plug-in-gait
+  marey run \"take 3\" --database walks --map map.toml            (see `marey markers --write`)
   marey run \"take 3\" --database walks --map LWRA=left_wrist --map RWRA=right_wrist
   marey run \"take 3\" --database walks --set chunk_frames=1200")]
 pub struct Args {
@@ -25,9 +27,13 @@ pub struct Args {
     /// Control points to use, separated by commas [default: all in the file]
     #[arg(long, value_delimiter = ',')]
     points: Vec<String>,
-    /// Which marker of the file is which control point: MARKER=POINT; may be given often
-    #[arg(long = "map", value_name = "MARKER=POINT")]
+    /// Which markers of the file make which control point: a marker set's name (see `marey markers`), a file with a marker
+    /// map, or MARKER=POINT, which may be given often [default: the set that the names belong to]
+    #[arg(long = "map", value_name = "SET, FILE or MARKER=POINT")]
     mapping: Vec<String>,
+    /// What the names of the performer's markers begin with, where a file has several people: Anna:
+    #[arg(long, value_name = "PREFIX")]
+    prefix: Option<String>,
     /// Axis of a TRC or C3D file that points up: x, y or z [default: what the file says, else y for TRC, z for C3D]
     #[arg(long, value_parser = ["x", "y", "z"])]
     up: Option<String>,
@@ -82,10 +88,7 @@ fn request(args: &Args) -> anyhow::Result<Value> {
     let mut request = json!({ "motion_database": args.database });
     let named = [
         ("points", (!args.points.is_empty()).then(|| json!(args.points))),
-        (
-            "mapping",
-            (!args.mapping.is_empty()).then(|| pairs(&args.mapping, |point| point.into())).transpose()?,
-        ),
+        ("marker_prefix", args.prefix.as_ref().map(|prefix| json!(prefix))),
         ("up", args.up.as_ref().map(|axis| json!(axis))),
         ("bvh_metres_per_unit", args.bvh_unit.map(Value::from)),
         ("method", args.method.as_ref().map(|m| json!(m))),
@@ -99,6 +102,9 @@ fn request(args: &Args) -> anyhow::Result<Value> {
                 .transpose()?,
         ),
     ];
+    for (name, value) in marker_sets::request(&args.mapping)? {
+        request[name] = value;
+    }
     for (name, value) in named {
         if let Some(value) = value {
             request[name] = value;

@@ -48,13 +48,24 @@ pub enum InputError {
         /// Names in the file.
         has: String,
     },
-    /// Two names of the file are mapped to one.
-    #[error("mapping leads to {name:?} more than once in {file}")]
+    /// A name of the file is mapped to another that is in it too.
+    #[error("mapping leads to {name:?} more than once in {file}: it has that name itself")]
     MappedTwice {
         /// The name.
         name: String,
         /// Name of the file.
         file: String,
+    },
+    /// The marker map or set of the request is none.
+    #[error(transparent)]
+    MarkerMap(#[from] markers::Error),
+    /// Markers of a file can't be made control points.
+    #[error("{file}: {source}")]
+    Markers {
+        /// Name of the file.
+        file: String,
+        /// Which, and why.
+        source: markers::Error,
     },
     /// The session is longer than this service takes.
     #[error(

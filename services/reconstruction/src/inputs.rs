@@ -1,14 +1,15 @@
 //! From a session's files to evidence: skeleton, control points, and the truth if it is known.
 
-use crate::{error::InputError, payload::Reading};
+use crate::{
+    control::{self, Markers},
+    error::InputError,
+    payload::Reading,
+};
 use bytes::Bytes;
 use formats::{Read, archive, asf, points_csv};
 use model::{Motion, PointTrajectories, Skeleton};
-use sparse::{Session, control_points};
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    sync::Arc,
-};
+use sparse::Session;
+use std::sync::Arc;
 
 /// Frame rate of an AMC that does not state it when nothing else fits: CMU's, Hz.
 const AMC_FRAME_RATE: f64 = 120.0;
@@ -45,10 +46,10 @@ impl NamedBytes {
 /// Which trajectories of a file are the control points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Selection<'a> {
-    /// Names of control points or joints; empty: those of `mapping`, or else all of the file.
+    /// Names of control points or joints; empty: all that the markers make.
     pub points: &'a [String],
-    /// Name in the file → name of a control point or joint.
-    pub mapping: &'a BTreeMap<String, String>,
+    /// What the file's names stand for.
+    pub markers: &'a Markers,
     /// How the files are to be read.
     pub reading: Reading,
 }
@@ -86,10 +87,9 @@ pub(crate) fn read(
         expected: "one (CSV, TRC or C3D)",
     })?;
     let trajectories = read_points(file, selection.reading, &mut warnings)?;
-    let trajectories = rename(trajectories, selection.mapping, &file.name)?;
-    let names = selected(&trajectories, selection);
-    let points = control_points(&skeleton, &names)?;
-    let session = Session::new(skeleton, points, &trajectories)?;
+    let Selection { points, markers, .. } = *selection;
+    let chosen = control::choose(&file.name, trajectories, markers, points, &skeleton, &mut warnings)?;
+    let session = Session::new(skeleton, chosen.points, &chosen.trajectories)?;
     if let Some(truth) = ground_truth(files, fallback, selection.reading, session.num_frames() as f64 / 60.0)?
     {
         warnings.extend(truth.warnings.iter().map(|w| w.to_string()));
@@ -176,37 +176,6 @@ fn read_points(
 fn note<T>(read: Read<T>, file: &NamedBytes, warnings: &mut Vec<String>) -> T {
     warnings.extend(read.warnings.iter().map(|w| format!("{}: {w}", file.name)));
     read.value
-}
-
-/// The same trajectories under the names that the mapping gives them.
-fn rename(
-    trajectories: PointTrajectories,
-    mapping: &BTreeMap<String, String>,
-    file: &str,
-) -> Result<PointTrajectories, InputError> {
-    if let Some(name) = mapping.keys().find(|name| trajectories.point_index(name).is_none()) {
-        let has = trajectories.names().join(", ");
-        return Err(InputError::Mapping { name: name.clone(), file: file.to_owned(), has });
-    }
-    let renamed = |name: &String| mapping.get(name).unwrap_or(name).clone();
-    let names: Vec<String> = trajectories.names().iter().map(renamed).collect();
-    let mut seen = BTreeSet::new();
-    if let Some(name) = names.iter().find(|name| !seen.insert(*name)) {
-        return Err(InputError::MappedTwice { name: name.clone(), file: file.to_owned() });
-    }
-    let positions = (0..trajectories.num_frames()).flat_map(|f| trajectories.frame(f)).copied().collect();
-    let renamed = PointTrajectories::new(names, trajectories.frame_rate(), positions);
-    Ok(renamed.map_err(sparse::Error::from)?)
-}
-
-/// Names of the control points, in the order asked for or else of the file.
-fn selected(trajectories: &PointTrajectories, selection: &Selection<'_>) -> Vec<String> {
-    if !selection.points.is_empty() {
-        return selection.points.to_vec();
-    }
-    let is_mapped =
-        |name: &&String| selection.mapping.is_empty() || selection.mapping.values().any(|v| v == *name);
-    trajectories.names().iter().filter(is_mapped).cloned().collect()
 }
 
 fn at_most_one<'a>(

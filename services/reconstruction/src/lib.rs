@@ -11,6 +11,7 @@
 //! not depend on how many workers there were or what happened to them.
 
 mod chunk_job;
+mod control;
 mod error;
 mod evaluate;
 mod export;

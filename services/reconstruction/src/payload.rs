@@ -1,6 +1,7 @@
 //! What the jobs of this service are given. Everything that decides the result is in here.
 
 use crate::performer::FittedReport;
+use crate::{control::Markers, error::InputError};
 use formats::{BvhOptions, PointsOptions};
 use model::Axis;
 pub use payloads::{InputFile, MotionDatabaseFile, Object};
@@ -27,6 +28,16 @@ pub struct PlanSparse {
     /// Name in the file → name of a control point or joint.
     #[serde(default)]
     pub mapping: BTreeMap<String, String>,
+    /// The marker set whose names the file has: `auto` (or nothing) to find out, `none` for control points under their
+    /// own names, or a preset's name.
+    #[serde(default)]
+    pub marker_set: Option<String>,
+    /// Text of a marker map, TOML.
+    #[serde(default)]
+    pub marker_map: Option<String>,
+    /// What the names of the performer's markers begin with.
+    #[serde(default)]
+    pub marker_prefix: Option<String>,
     /// Axis of TRC and C3D files that points up, where the file does not say it or says it wrong.
     #[serde(default)]
     pub up: Option<Axis>,
@@ -42,6 +53,16 @@ fn centimetres() -> f64 {
 }
 
 impl PlanSparse {
+    /// What the names of the file of control points stand for.
+    ///
+    /// # Errors
+    /// If the marker map or set is none.
+    pub(crate) fn markers(&self) -> Result<Markers, InputError> {
+        let [map, set, prefix] =
+            [&self.marker_map, &self.marker_set, &self.marker_prefix].map(Option::as_deref);
+        Markers::new(&self.mapping, map, set, prefix)
+    }
+
     /// How the session's files are to be read.
     pub(crate) fn reading(&self) -> Reading {
         Reading {

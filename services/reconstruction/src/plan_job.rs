@@ -50,11 +50,9 @@ impl Handler for PlanHandler {
 
         let (limit, asked) = (memory.max_session_frames, request.clone());
         let (evidence, fitted, bytes) = compute::run(move || -> Result<_, InputError> {
-            let selection = inputs::Selection {
-                points: &asked.points,
-                mapping: &asked.mapping,
-                reading: asked.reading(),
-            };
+            let markers = asked.markers()?;
+            let selection =
+                inputs::Selection { points: &asked.points, markers: &markers, reading: asked.reading() };
             let mut evidence = inputs::read(&files, &selection, prior.database.skeleton())?;
             if is_synthetic(prior.database.skeleton()) {
                 evidence.warnings.push("the motion database is synthetic: drawn, not recorded".to_owned());

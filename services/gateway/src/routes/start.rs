@@ -45,6 +45,16 @@ pub(crate) struct NewReconstruction {
     #[serde(default)]
     #[schema(example = json!({"LWRA": "left_wrist"}))]
     mapping: BTreeMap<String, String>,
+    /// marker set whose names the file has: `auto` to find out, `none` if they are names of control points, or a preset
+    /// such as `plug-in-gait`; `auto` when left out
+    #[schema(example = "auto")]
+    marker_set: Option<String>,
+    /// a marker map (TOML): which markers make which control point, with offsets and standard deviations
+    #[schema(example = "[points]\nleft_wrist = [\"LWRA\", \"LWRB\"]\nhead = \"TOP\"\n")]
+    marker_map: Option<String>,
+    /// what the names of the performer's markers begin with, where a file has several people
+    #[schema(example = "Anna:")]
+    marker_prefix: Option<String>,
     /// the axis of a TRC or C3D file that points up: `x`, `y` or `z`; what the file says, else y (TRC) or z (C3D), when left out
     #[schema(value_type = Option<String>, example = "z")]
     up: Option<model::Axis>,
@@ -71,6 +81,7 @@ impl NewReconstruction {
         if self.mapping.len() > MAX_NAMES {
             return refuse(format!("mapping has {} names, expected at most {MAX_NAMES}", self.mapping.len()));
         }
+        self.check_markers()?;
         if self.points.is_empty() {
             return Ok(());
         }
@@ -82,6 +93,25 @@ impl NewReconstruction {
             Some(twice) => refuse(format!("points has {twice:?} twice, expected every point once")),
             None => Ok(()),
         }
+    }
+
+    /// The markers are said in one way at most, and that way makes sense.
+    fn check_markers(&self) -> Result<()> {
+        let refuse = |what: String| Err(Error::Unprocessable(what));
+        let set = self.marker_set.as_deref().filter(|set| *set != "auto");
+        let ways = [!self.mapping.is_empty(), self.marker_map.is_some(), set.is_some()];
+        if ways.iter().filter(|is_given| **is_given).count() > 1 {
+            return refuse("expected one of mapping, marker_map and marker_set, found several".into());
+        }
+        let checked = match (&self.marker_map, set) {
+            (Some(text), _) => markers::MarkerMap::parse(text).map(drop),
+            (None, Some(set)) if set != "none" => markers::preset(set).map(drop),
+            _ if self.marker_prefix.is_some() => {
+                return refuse("marker_prefix needs a marker_map, or a marker_set by name".into());
+            }
+            _ => Ok(()),
+        };
+        checked.map_err(|error| Error::Unprocessable(error.to_string()))
     }
 
     fn resolve(&self, has_own_skeleton: bool) -> Result<Value> {
@@ -171,6 +201,9 @@ pub(super) async fn reconstruction(
         files,
         points: body.points,
         mapping: body.mapping,
+        marker_set: body.marker_set.unwrap_or_else(|| "auto".to_owned()),
+        marker_map: body.marker_map,
+        marker_prefix: body.marker_prefix,
         up: body.up,
         bvh_metres_per_unit,
         parameters,

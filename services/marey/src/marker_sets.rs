@@ -1,0 +1,254 @@
+//! `marey markers`, and what `--map` may be.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, bail};
+use formats::{PointsOptions, Read, archive};
+use markers::{Fit, MarkerMap, fits};
+use model::{Axis, PointTrajectories};
+use serde_json::{Map, Value, json};
+
+/// Largest file that is looked at, bytes.
+const MAX_BYTES: u64 = 1 << 30;
+/// Fits that are shown.
+const SHOWN: usize = 3;
+
+/// Show which markers a file has and which control points they make
+///
+/// Compares the names in a C3D, TRC or CSV file with the known marker sets. `marey run` takes the best one by itself where
+/// it is clear; `--write` makes a marker map of it, a text file to edit and give to `marey run --map`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  marey markers take3.c3d
+  marey markers take3.c3d --write take3.toml
+  marey run \"take 3\" --database walks --map take3.toml
+  marey markers --list")]
+pub struct Args {
+    /// C3D, TRC or CSV file, also compressed (.gz, .zst)
+    #[arg(required_unless_present = "list")]
+    file: Option<PathBuf>,
+    /// Show this marker set or map instead of the one that fits best: a set's name or a file
+    #[arg(long, value_name = "SET or FILE")]
+    map: Option<String>,
+    /// Write a marker map to edit
+    #[arg(long, value_name = "FILE")]
+    write: Option<PathBuf>,
+    /// Axis of the file that points up: x, y or z [default: what the file says, else y for TRC, z for C3D]
+    #[arg(long, value_parser = axis)]
+    up: Option<Axis>,
+    /// List the known marker sets
+    #[arg(long)]
+    list: bool,
+}
+
+fn axis(name: &str) -> Result<Axis, String> {
+    match name {
+        "x" => Ok(Axis::X),
+        "y" => Ok(Axis::Y),
+        "z" => Ok(Axis::Z),
+        _ => Err(format!("found {name:?}, expected x, y or z")),
+    }
+}
+
+/// Runs `marey markers`.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let Some(path) = args.file.as_ref().filter(|_| !args.list) else {
+        list();
+        return Ok(());
+    };
+    let read = read(path, args.up)?;
+    for warning in &read.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let file = read.value;
+    let seconds = file.num_frames() as f64 / file.frame_rate();
+    println!(
+        "{}: {} markers, {} frames at {} Hz ({seconds:.1} s)",
+        path.display(),
+        file.num_points(),
+        file.num_frames(),
+        file.frame_rate()
+    );
+    let found = fits(file.names());
+    let detected = markers::detect(file.names());
+    let map = match (&args.map, &detected) {
+        (Some(name), _) => Some(named(name)?),
+        (None, Ok(fit)) => Some(fit.with_prefix()),
+        (None, Err(error)) => {
+            println!("{error}");
+            None
+        }
+    };
+    if let Some(map) = &map {
+        show(map, &file)?;
+    }
+    println!("\nknown marker sets that have some of the names:");
+    for fit in found.iter().take(SHOWN) {
+        println!(
+            "  {:<28} {} of {} control points; {} of the file's {} names",
+            fit.label(),
+            fit.num_whole(),
+            fit.points.len(),
+            fit.num_known,
+            fit.num_names
+        );
+    }
+    if found.is_empty() {
+        println!("  none; the file has {}", file.names().join(", "));
+    }
+    if let Some(to) = &args.write {
+        write(to, &file, detected.ok().as_ref())?;
+    }
+    Ok(())
+}
+
+fn list() {
+    for map in markers::presets() {
+        println!("{:<20} {}", map.name, map.description);
+        if !map.aliases.is_empty() {
+            println!("{:<20} also {}", "", map.aliases.join(", "));
+        }
+    }
+}
+
+/// The control points that a map makes of a file.
+fn show(map: &MarkerMap, file: &PointTrajectories) -> anyhow::Result<()> {
+    let mapped = map.apply(file, &[])?;
+    let prefix = map.prefix.as_deref().unwrap_or_default();
+    let name = if map.name.is_empty() { "marker map" } else { &map.name };
+    println!("{name}{}:", if prefix.is_empty() { String::new() } else { format!(" for {prefix}") });
+    for point in &mapped.points {
+        println!(
+            "  {:<12} {:<44} {:>5.1} % of the frames",
+            point.name,
+            point.markers.join(", "),
+            100.0 * point.measured as f64 / file.num_frames().max(1) as f64
+        );
+    }
+    for warning in &mapped.warnings {
+        println!("  {warning}");
+    }
+    Ok(())
+}
+
+fn write(to: &Path, file: &PointTrajectories, fit: Option<&Fit<'_>>) -> anyhow::Result<()> {
+    if to.exists() {
+        bail!("{} is there already; remove it or write another", to.display());
+    }
+    fs::write(to, markers::template(file.names(), fit)).with_context(|| to.display().to_string())?;
+    println!(
+        "\nwrote {}; edit it, then\n  marey run SESSION --database NAME --map {}",
+        to.display(),
+        to.display()
+    );
+    Ok(())
+}
+
+/// A marker set by name, or a map from a file.
+fn named(name: &str) -> anyhow::Result<MarkerMap> {
+    if is_file(name) {
+        return MarkerMap::parse(&text(name)?).with_context(|| name.to_owned());
+    }
+    Ok(markers::preset(name)?.clone())
+}
+
+fn is_file(name: &str) -> bool {
+    name.ends_with(".toml") || Path::new(name).is_file()
+}
+
+fn text(name: &str) -> anyhow::Result<String> {
+    fs::read_to_string(name).with_context(|| name.to_owned())
+}
+
+fn read(path: &Path, up: Option<Axis>) -> anyhow::Result<Read<PointTrajectories>> {
+    let name = path.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let mut bytes = fs::read(path).with_context(|| path.display().to_string())?;
+    let plain = name.strip_suffix(".zst").or(name.strip_suffix(".gz")).unwrap_or(&name);
+    if plain != name {
+        let limits = archive::Limits { total_bytes: MAX_BYTES, entries: 1, ..archive::Limits::default() };
+        let entries = archive::entries(&name, &bytes, &limits);
+        let mut entries = entries.with_context(|| path.display().to_string())?;
+        bytes = entries.pop().map(|entry| entry.bytes).unwrap_or_default();
+    }
+    let options = PointsOptions { up, ..PointsOptions::default() };
+    let read = match plain.rsplit_once('.').map_or("", |(_, extension)| extension) {
+        "c3d" => formats::c3d::read(&bytes, &options),
+        "trc" => formats::trc::read(&bytes, &options),
+        "csv" => formats::points_csv::read_with(&bytes, &options),
+        _ => bail!("{}: found a file of another kind, expected .c3d, .trc or .csv", path.display()),
+    };
+    read.with_context(|| path.display().to_string())
+}
+
+/// The fields of a request that `--map` stands for: pairs, one file, or one marker set.
+///
+/// # Errors
+/// If they are mixed, or a file or a set is none.
+pub fn request(given: &[String]) -> anyhow::Result<Map<String, Value>> {
+    let is_pair = |text: &&String| text.contains('=') && !is_file(text);
+    let pairs: Vec<&String> = given.iter().filter(is_pair).collect();
+    let mut request = Map::new();
+    match (pairs.len(), given) {
+        (0, []) => {}
+        (0, [name]) if is_file(name) => {
+            let text = text(name)?;
+            // what is wrong with it is said before anything is sent
+            MarkerMap::parse(&text).with_context(|| name.clone())?;
+            request.insert("marker_map".to_owned(), text.into());
+        }
+        (0, [name]) => {
+            if !matches!(name.as_str(), "auto" | "none") {
+                markers::preset(name).with_context(|| {
+                    format!("--map {name} is neither a file, a marker set nor MARKER=POINT")
+                })?;
+            }
+            request.insert("marker_set".to_owned(), name.clone().into());
+        }
+        (count, all) if count == all.len() => {
+            let pairs = pairs.iter().filter_map(|pair| pair.split_once('='));
+            let pairs: Map<_, _> =
+                pairs.map(|(marker, point)| (marker.trim().to_owned(), json!(point.trim()))).collect();
+            request.insert("mapping".to_owned(), pairs.into());
+        }
+        _ => bail!("--map takes one file, one marker set, or any number of MARKER=POINT"),
+    }
+    Ok(request)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(given: &[&str]) -> anyhow::Result<Value> {
+        let given: Vec<String> = given.iter().map(|g| (*g).to_owned()).collect();
+        request(&given).map(Value::Object)
+    }
+
+    #[test]
+    fn a_map_is_pairs_a_set_or_a_file() {
+        assert_eq!(asked(&[]).unwrap(), json!({}));
+        assert_eq!(asked(&["plug-in-gait"]).unwrap(), json!({"marker_set": "plug-in-gait"}));
+        let pairs = json!({"mapping": {"LWRA": "left_wrist", "LWRB": "left_wrist"}});
+        assert_eq!(asked(&["LWRA=left_wrist", "LWRB = left_wrist"]).unwrap(), pairs);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.toml");
+        fs::write(&path, "[points]\nhead = 'T'\n").unwrap();
+        assert_eq!(
+            asked(&[path.to_str().unwrap()]).unwrap(),
+            json!({"marker_map": "[points]\nhead = 'T'\n"})
+        );
+        fs::write(&path, "[points]\nhead = 3\n").unwrap();
+        assert!(format!("{:#}", asked(&[path.to_str().unwrap()]).unwrap_err()).contains("line 2"));
+    }
+
+    #[test]
+    fn a_map_that_is_nothing_or_several_things_is_refused() {
+        for given in [&["nobody"][..], &["a=b", "plug-in-gait"], &["cmu-41", "plug-in-gait"], &["gone.toml"]]
+        {
+            assert!(asked(given).is_err(), "{given:?}");
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Which trajectories of a file are the control points, and which points of the skeleton they are.
+
+use crate::error::InputError;
+use kinematics::ControlPoint;
+use markers::MarkerMap;
+use model::{PointTrajectories, Skeleton};
+use nalgebra::Vector3;
+use sparse::control_points;
+use std::collections::BTreeMap;
+
+/// What the markers of a file are.
+#[derive(Debug, Clone, Default)]
+pub(crate) enum Markers {
+    /// Control points if they are called so, else of the preset that their names belong to.
+    #[default]
+    Auto,
+    /// Control points under their own names.
+    AsNamed,
+    /// Name in the file → name of a control point or joint; the mean where several lead to one.
+    Pairs(BTreeMap<String, String>),
+    /// Those of a preset; what is not in the file is left out.
+    Preset(MarkerMap),
+    /// Those of a map that the user wrote; everything in it must be in the file.
+    Map(MarkerMap),
+}
+
+impl Markers {
+    /// From what a run was asked for; at most one of `mapping`, `map` (its text) and a `set` other than `auto` is given.
+    ///
+    /// # Errors
+    /// If the map or the set is none.
+    pub fn new(
+        mapping: &BTreeMap<String, String>,
+        map: Option<&str>,
+        set: Option<&str>,
+        prefix: Option<&str>,
+    ) -> Result<Self, InputError> {
+        let with_prefix = |mut map: MarkerMap| {
+            map.prefix = prefix.map(str::to_owned).or(map.prefix);
+            map
+        };
+        Ok(match (map, set) {
+            _ if !mapping.is_empty() => Self::Pairs(mapping.clone()),
+            (Some(text), _) => Self::Map(with_prefix(MarkerMap::parse(text)?)),
+            (None, None | Some("auto")) => Self::Auto,
+            (None, Some("none")) => Self::AsNamed,
+            (None, Some(name)) => Self::Preset(with_prefix(markers::preset(name)?.clone())),
+        })
+    }
+}
+
+/// Control points with their trajectories.
+pub(crate) struct Chosen {
+    pub points: Vec<ControlPoint>,
+    pub trajectories: PointTrajectories,
+}
+
+/// Finds the control points among a file's trajectories. `wanted`: their names; empty: all.
+///
+/// # Errors
+/// If names stand for nothing, or for more than one thing.
+pub(crate) fn choose(
+    file: &str,
+    trajectories: PointTrajectories,
+    markers: &Markers,
+    wanted: &[String],
+    skeleton: &Skeleton,
+    warnings: &mut Vec<String>,
+) -> Result<Chosen, InputError> {
+    let in_file = |source| InputError::Markers { file: file.to_owned(), source };
+    let names = trajectories.names();
+    let (map, must_have) = match markers {
+        Markers::AsNamed => return as_named(trajectories, wanted, skeleton),
+        Markers::Auto if has_control_points(names, skeleton) => {
+            return as_named(trajectories, wanted, skeleton);
+        }
+        Markers::Auto => (detected(file, names, warnings).map_err(in_file)?, false),
+        Markers::Pairs(pairs) => (map_of(pairs, names, wanted, file)?, true),
+        Markers::Preset(map) => (map.clone(), false),
+        Markers::Map(map) => (map.clone(), true),
+    };
+    let all: Vec<String> = map.points().map(|p| p.name.clone()).collect();
+    let asked = if wanted.is_empty() && must_have { &all[..] } else { wanted };
+    let mapped = map.apply(&trajectories, asked).map_err(in_file)?;
+    warnings.extend(mapped.warnings.iter().map(|warning| format!("{file}: {warning}")));
+
+    // In the order asked for, or else of the file.
+    let mut names: Vec<String> = mapped.trajectories.names().to_vec();
+    if wanted.is_empty() {
+        let first = |name: &String| {
+            let point = mapped.points.iter().find(|p| p.name == *name);
+            point.and_then(|p| p.markers.iter().filter_map(|m| trajectories.point_index(m)).min())
+        };
+        names.sort_by_key(first);
+    } else {
+        names = wanted.to_vec();
+    }
+    let mut points = control_points(skeleton, &names)?;
+    for point in &mut points {
+        if let Some(made) = mapped.points.iter().find(|p| p.name == point.name) {
+            point.offset += Vector3::from(made.offset_m);
+        }
+    }
+    Ok(Chosen { points, trajectories: mapped.trajectories })
+}
+
+fn as_named(
+    trajectories: PointTrajectories,
+    wanted: &[String],
+    skeleton: &Skeleton,
+) -> Result<Chosen, InputError> {
+    let names = if wanted.is_empty() { trajectories.names() } else { wanted };
+    Ok(Chosen { points: control_points(skeleton, names)?, trajectories })
+}
+
+/// Whether the file's names are meant as control points: two of them are.
+fn has_control_points(names: &[String], skeleton: &Skeleton) -> bool {
+    names.iter().filter(|name| control_points(skeleton, &[name]).is_ok()).count() >= 2
+}
+
+fn detected(file: &str, names: &[String], warnings: &mut Vec<String>) -> markers::Result<MarkerMap> {
+    let fit = markers::detect(names)?;
+    warnings.push(format!(
+        "{file}: its markers are taken for the set {}, which has {} of {} control points here; \
+         `marker_set` says another",
+        fit.label(),
+        fit.num_any(),
+        fit.points.len()
+    ));
+    Ok(fit.with_prefix())
+}
+
+/// Pairs as a map, with the points that are wanted and that the file has under their own names.
+fn map_of(
+    pairs: &BTreeMap<String, String>,
+    names: &[String],
+    wanted: &[String],
+    file: &str,
+) -> Result<MarkerMap, InputError> {
+    if let Some(name) = pairs.keys().find(|name| !names.contains(name)) {
+        return Err(InputError::Mapping { name: name.clone(), file: file.to_owned(), has: names.join(", ") });
+    }
+    if let Some(name) = pairs.values().find(|name| names.contains(name) && !pairs.contains_key(*name)) {
+        return Err(InputError::MappedTwice { name: name.clone(), file: file.to_owned() });
+    }
+    let own =
+        wanted.iter().filter(|name| names.contains(name) && !pairs.values().any(|point| point == *name));
+    let own = own.map(|name| (name.as_str(), name.as_str()));
+    Ok(MarkerMap::from_pairs(
+        pairs.iter().map(|(marker, point)| (marker.as_str(), point.as_str())).chain(own),
+    ))
+}
