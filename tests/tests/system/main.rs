@@ -7,6 +7,7 @@ mod downloads;
 mod faults;
 mod interface;
 mod live;
+mod markers;
 mod runs;
 mod uploads;
 
