@@ -167,7 +167,9 @@ fn climb(evidence: &mut Evidence<'_>, prior: Matrix3<f64>) -> (Vector3<f64>, Mat
             step *= 0.4;
             next = evidence.at(&(theta + step));
         }
-        if !(next.log > value.log) {
+        // Also where it is not a number.
+        let is_higher = next.log > value.log;
+        if !is_higher {
             break;
         }
         let change = value.gradient - next.gradient;

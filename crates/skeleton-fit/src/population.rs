@@ -50,11 +50,10 @@ impl Population {
         let mut scatter = Matrix3::zeros();
         for proportions in &distinct {
             let lengths = limbs.lengths(&with_proportions(template, proportions)?);
-            let mut log = [0.0; 3];
-            for i in 0..3 {
-                log[i] =
-                    if middle[i] > 0.0 && lengths[i] > 0.0 { (lengths[i] / middle[i]).ln() } else { 0.0 };
-            }
+            let log: [f64; 3] = std::array::from_fn(|i| {
+                let (length, middle): (f64, f64) = (lengths[i], middle[i]);
+                if middle > 0.0 && length > 0.0 { (length / middle).ln() } else { 0.0 }
+            });
             let log = Vector3::from(log);
             scatter += log * log.transpose();
         }

@@ -86,10 +86,10 @@ pub fn evaluate_feet(
     };
     let (mut both, mut true_frames, mut found_frames) = (0.0, 0.0f64, 0.0f64);
     for (t, f) in standing.feet().iter().zip(held.contacts.feet()) {
-        for side in 0..2 {
-            both += f64::from(u8::from(t[side] && f[side]));
-            true_frames += f64::from(u8::from(t[side]));
-            found_frames += f64::from(u8::from(f[side]));
+        for (t, f) in t.iter().zip(f) {
+            both += f64::from(u8::from(*t && f));
+            true_frames += f64::from(u8::from(*t));
+            found_frames += f64::from(u8::from(f));
         }
     }
     let (recall, precision) = (both / true_frames.max(1.0), both / found_frames.max(1.0));

@@ -96,11 +96,8 @@ pub fn evaluate_skeletons(
         let found = lengths(&skeleton);
         let session = Session::new(skeleton.into(), points, &trajectories)?;
         let motion = reconstruct(trial, &session, source, parameters)?;
-        let (mut error_m, mut error_percent) = ([0.0; 3], [0.0; 3]);
-        for i in 0..3 {
-            error_m[i] = found[i] - sizes[i];
-            error_percent[i] = 100.0 * error_m[i] / sizes[i].max(1e-9);
-        }
+        let error_m: [f64; 3] = std::array::from_fn(|i| found[i] - sizes[i]);
+        let error_percent: [f64; 3] = std::array::from_fn(|i| 100.0 * error_m[i] / sizes[i].max(1e-9));
         results.push(SkeletonResult {
             trial: clip.name.clone(),
             subject: clip.subject.clone(),
