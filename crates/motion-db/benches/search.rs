@@ -1,4 +1,4 @@
-//! How long one exact search takes, by the number of poses: recorded motion where it is there (31 thousand poses),
+//! How long one search takes, exact and fast, by the number of poses: recorded motion where it is there (31 thousand poses),
 //! drawn motion otherwise.
 
 use divan::Bencher;
@@ -51,7 +51,7 @@ fn database(poses: usize) -> Option<MotionDatabase> {
 }
 
 /// One frame after the other of a walk that the database does not hold, the last matches' successors as hints.
-fn search(bencher: Bencher, poses: usize, with_controls: bool) {
+fn search(bencher: Bencher, poses: usize, with_controls: bool, fast: bool) {
     let Some(database) = database(poses) else { return };
     let Ok(index) = WindowIndex::new(&database, 2) else { return };
     let Some(asked) = drawn(1_000) else { return };
@@ -87,7 +87,11 @@ fn search(bencher: Bencher, poses: usize, with_controls: bool) {
         let (features, controls) = &questions[t];
         let controls = with_controls.then_some((&table, &controls[..], &weights[..]));
         let query = Query { features, controls, exclude: &[], hints: &hints };
-        index.nearest(&query, 64, &mut memory, &mut found);
+        if fast {
+            index.nearest_fast(&query, 64, &mut memory, &mut found);
+        } else {
+            index.nearest(&query, 64, &mut memory, &mut found);
+        }
         hints.clear();
         hints.extend(found.iter().map(|n| n.row + 1));
         hints.sort_unstable();
@@ -96,10 +100,20 @@ fn search(bencher: Bencher, poses: usize, with_controls: bool) {
 
 #[divan::bench(args = [8_000, 31_000])]
 fn nearest_64_windows(bencher: Bencher, poses: usize) {
-    search(bencher, poses, false);
+    search(bencher, poses, false, false);
 }
 
 #[divan::bench(args = [8_000, 31_000])]
 fn nearest_64_windows_and_control_points(bencher: Bencher, poses: usize) {
-    search(bencher, poses, true);
+    search(bencher, poses, true, false);
+}
+
+#[divan::bench(args = [8_000, 31_000])]
+fn nearly_all_of_the_nearest_64_windows(bencher: Bencher, poses: usize) {
+    search(bencher, poses, false, true);
+}
+
+#[divan::bench(args = [8_000, 31_000])]
+fn nearly_all_of_the_nearest_64_windows_and_control_points(bencher: Bencher, poses: usize) {
+    search(bencher, poses, true, true);
 }

@@ -59,8 +59,21 @@ fn list_controls(of_segments: &[f32], dims: usize, segments: &Segments) -> Vec<f
     means
 }
 
+/// In four lanes, so that it is vectorised; the order of the sum is fixed.
+#[inline(always)]
 fn weighted_distance(a: &[f32], b: &[f32], weights: &[f32]) -> f32 {
-    a.iter().zip(b).zip(weights).map(|((a, b), w)| w * (a - b) * (a - b)).sum()
+    let a = &a[..b.len()];
+    let mut lanes = [0.0; 4];
+    let (a4, a_rest) = a.as_chunks::<4>();
+    let (b4, b_rest) = b.as_chunks::<4>();
+    let (w4, w_rest) = weights.as_chunks::<4>();
+    for ((a, b), w) in a4.iter().zip(b4).zip(w4) {
+        for i in 0..4 {
+            lanes[i] += w[i] * (a[i] - b[i]) * (a[i] - b[i]);
+        }
+    }
+    let rest: f32 = a_rest.iter().zip(b_rest).zip(w_rest).map(|((a, b), w)| w * (a - b) * (a - b)).sum();
+    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
 }
 
 impl ControlTable {
@@ -124,13 +137,13 @@ impl ControlTable {
     }
 
     /// Squared, weighted distance of `controls` from the middle of a segment's.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn segment_distance(&self, segment: usize, controls: &[f32], weights: &[f32]) -> f32 {
         weighted_distance(&self.of_segments[segment * self.relative.dims()..], controls, weights)
     }
 
     /// Squared, weighted distance of `controls` from the middle of a list's.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn list_distance(&self, list: usize, controls: &[f32], weights: &[f32]) -> f32 {
         weighted_distance(&self.of_lists[list * self.relative.dims()..], controls, weights)
     }

@@ -1,5 +1,7 @@
 //! The fast search: most of what it finds is what the exact one finds.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use crate::graph::DEGREE;
 use crate::search::{Candidate, LANES, drain_nearest_first};
 use crate::segments::{Lead, Segments};
@@ -98,12 +100,13 @@ struct Ask<'a> {
 }
 
 impl Ask<'_> {
+    #[inline(always)]
     fn controls(&self, distance: impl Fn(&crate::ControlTable, &[f32], &[f32]) -> f32) -> f32 {
         self.query.controls.map_or(0.0, |(table, controls, weights)| distance(table, controls, weights))
     }
 
     /// Estimated squared distance of a segment's windows.
-    #[inline]
+    #[inline(always)]
     fn estimate(&self, segment: usize, tail: &[i16]) -> f32 {
         let lead = self.segments.lead_distance(&self.segments.lead[segment], &self.lead);
         let rest = if self.is_strange {
@@ -115,6 +118,7 @@ impl Ask<'_> {
     }
 
     /// Squared distance below which hardly a window of the segment lies.
+    #[inline(always)]
     fn bound(&self, segment: usize, estimate: f32, tail: &[i16]) -> f32 {
         let centre = if self.is_strange {
             estimate
@@ -125,7 +129,7 @@ impl Ask<'_> {
     }
 
     /// Adds a segment to what was found, unless it is there already.
-    #[inline]
+    #[inline(always)]
     fn add(&self, segment: usize, stamp: u32, scratch: &mut FastScratch) {
         if scratch.seen[segment] >= scratch.age {
             return;
@@ -139,6 +143,7 @@ impl Ask<'_> {
     }
 
     /// The segments of the hints, what follows them, and their neighbours in the graph.
+    #[inline(always)]
     fn add_along_graph(&self, scratch: &mut FastScratch) {
         let stamp = scratch.age;
         for &row in self.query.hints {
@@ -162,6 +167,7 @@ impl Ask<'_> {
     }
 
     /// The segments of the `count` nearest lists.
+    #[inline(always)]
     fn add_nearest_lists(&self, count: usize, scratch: &mut FastScratch) {
         scratch.lists.clear();
         let lists = &self.segments.lists;
@@ -198,6 +204,26 @@ impl WindowIndex {
             self.nearest(query, k, scratch, out);
             return Way::Exact;
         };
+        Arch::new().dispatch(FastSearch { index: self, segments, query, k, scratch, out })
+    }
+}
+
+/// The search, to be compiled for several instruction sets. It has the same bits on all of them.
+struct FastSearch<'a, 'q> {
+    index: &'a WindowIndex,
+    segments: &'a Segments,
+    query: &'a Query<'q>,
+    k: usize,
+    scratch: &'a mut Scratch,
+    out: &'a mut Vec<Neighbour>,
+}
+
+impl WithSimd for FastSearch<'_, '_> {
+    type Output = Way;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Way {
+        let Self { index, segments, query, k, scratch, out } = self;
         let lead = segments.quantise(query.features, &mut scratch.fast.tail);
         let energy: f32 = query.features.iter().skip(lead.len()).map(|v| v * v).sum();
         let is_strange = energy > STRANGE_ENERGY * segments.mean_energy;
@@ -208,7 +234,7 @@ impl WindowIndex {
             scratch.fast.start(segments.len());
             ask.add_along_graph(&mut scratch.fast);
             ask.add_nearest_lists(tracking.lists, &mut scratch.fast);
-            self.look_into(&ask, k, tracking.segments, scratch, out);
+            index.look_into(&ask, k, tracking.segments, scratch, out);
             let age = scratch.fast.age;
             let is_on_the_way =
                 |n: &&Neighbour| segments.of_row(n.row).is_some_and(|s| scratch.fast.seen[s] == age);
@@ -218,11 +244,14 @@ impl WindowIndex {
         }
         scratch.fast.start(segments.len());
         ask.add_nearest_lists(global.lists, &mut scratch.fast);
-        self.look_into(&ask, k, global.segments, scratch, out);
+        index.look_into(&ask, k, global.segments, scratch, out);
         Way::Global
     }
+}
 
+impl WindowIndex {
     /// The nearest windows of the best `count` segments that were found.
+    #[inline(always)]
     fn look_into(
         &self,
         ask: &Ask<'_>,

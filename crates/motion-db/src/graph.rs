@@ -1,3 +1,5 @@
+use pulp::Arch;
+
 use crate::Threads;
 use crate::lists::Lists;
 use crate::segments::{Lead, step_distance};
@@ -28,10 +30,12 @@ pub(crate) fn neighbour_graph(lead: &[Lead], lists: &Lists, threads: &impl Threa
             let own = &lead[segment];
             let list = lists.starts.partition_point(|&start| start as usize <= segment) - 1;
             found.clear();
-            for &list in &near[list] {
-                let others = lists.segments(list as usize).filter(|other| *other != segment);
-                found.extend(others.map(|other| (step_distance(own, &lead[other]), other as u32)));
-            }
+            Arch::new().dispatch(|| {
+                for &list in &near[list] {
+                    let others = lists.segments(list as usize).filter(|other| *other != segment);
+                    found.extend(others.map(|other| (step_distance(own, &lead[other]), other as u32)));
+                }
+            });
             if found.len() > CHOICE {
                 found.select_nth_unstable(CHOICE - 1);
                 found.truncate(CHOICE);

@@ -1,3 +1,5 @@
+use pulp::Arch;
+
 use crate::Threads;
 use crate::column::Column;
 use crate::segments::{LEAD, Lead, step_distance};
@@ -63,10 +65,12 @@ impl Lists {
 fn nearest_centroids(leads: &[Lead], centroids: &[Lead], threads: &impl Threads) -> Vec<u32> {
     let mut nearest = vec![0u32; leads.len()];
     threads.for_each_piece(&mut nearest, SEGMENTS_A_PIECE, |piece, out| {
-        for (lead, out) in leads[piece * SEGMENTS_A_PIECE..].iter().zip(out) {
-            let distances = centroids.iter().map(|c| step_distance(c, lead));
-            *out = distances.enumerate().min_by_key(|(_, d)| *d).map_or(0, |(i, _)| i as u32);
-        }
+        Arch::new().dispatch(|| {
+            for (lead, out) in leads[piece * SEGMENTS_A_PIECE..].iter().zip(out) {
+                let distances = centroids.iter().map(|c| step_distance(c, lead));
+                *out = distances.enumerate().min_by_key(|(_, d)| *d).map_or(0, |(i, _)| i as u32);
+            }
+        });
     });
     nearest
 }

@@ -1,5 +1,7 @@
 use std::ops::Range;
 
+use pulp::{Arch, Simd, WithSimd};
+
 use crate::column::Column;
 use crate::fast::FastScratch;
 use crate::{ControlTable, WindowIndex};
@@ -60,7 +62,7 @@ impl Blocks {
     }
 
     /// Adds the squared, weighted distances of a block's rows to `query`.
-    #[inline]
+    #[inline(always)]
     pub fn add_distances(
         &self,
         block: usize,
@@ -90,6 +92,7 @@ impl Blocks {
         }
     }
 
+    #[inline(always)]
     fn distance(&self, row: usize, query: &[f32], weights: Option<&[f32]>) -> f32 {
         let mut sums = [0.0; LANES];
         self.add_distances(row / LANES, query, weights, &mut sums);
@@ -175,10 +178,33 @@ pub(crate) fn drain_nearest_first(
     out.sort_unstable_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared).then(a.row.cmp(&b.row)));
 }
 
+/// The exact search, to be compiled for several instruction sets. It has the same bits on all of them.
+struct ExactSearch<'a, 'q> {
+    index: &'a WindowIndex,
+    query: &'a Query<'q>,
+    k: usize,
+    scratch: &'a mut Scratch,
+    out: &'a mut Vec<Neighbour>,
+}
+
+impl WithSimd for ExactSearch<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.index.scan(self.query, self.k, self.scratch, self.out);
+    }
+}
+
 impl WindowIndex {
     /// The `k` nearest windows, nearest first: exact, by one scan of the leading principal features with the rest of
     /// a row read only where these cannot rule it out.
     pub fn nearest(&self, query: &Query<'_>, k: usize, scratch: &mut Scratch, out: &mut Vec<Neighbour>) {
+        Arch::new().dispatch(ExactSearch { index: self, query, k, scratch, out });
+    }
+
+    #[inline(always)]
+    fn scan(&self, query: &Query<'_>, k: usize, scratch: &mut Scratch, out: &mut Vec<Neighbour>) {
         let heap = &mut scratch.heap;
         heap.clear();
         out.clear();
@@ -248,7 +274,7 @@ impl WindowIndex {
     }
 
     /// Adds the features behind the prefix to `start`; stops (with what it has, above `limit`) once it is too far.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn full_distance(&self, row: usize, query: &[f32], start: f32, limit: f32) -> f32 {
         let skip = self.prefix.dims();
         let (a, a_rest) = self.features(row)[skip..].as_chunks::<16>();

@@ -187,13 +187,13 @@ impl Segments {
     }
 
     /// Squared distance of a centre's leading features from the query's, (degrees, centimetres)².
-    #[inline]
+    #[inline(always)]
     pub fn lead_distance(&self, lead: &Lead, query: &Lead) -> f32 {
         step_distance(lead, query) as f32 / (self.scale * self.scale)
     }
 
     /// Squared distance of a centre's other features from the query's, (degrees, centimetres)².
-    #[inline]
+    #[inline(always)]
     pub fn tail_distance(&self, segment: usize, query: &[i16]) -> f32 {
         let (a, a_rest) = self.tail[segment * query.len()..][..query.len()].as_chunks::<LEAD>();
         let (b, b_rest) = query.as_chunks::<LEAD>();
@@ -205,7 +205,7 @@ impl Segments {
 }
 
 /// Squared distance, steps². Never overflows: see [`MAX_QUERY`].
-#[inline]
+#[inline(always)]
 pub(crate) fn step_distance(a: &Lead, b: &Lead) -> u32 {
     let mut sum = 0i32;
     for (x, y) in a.iter().zip(b) {

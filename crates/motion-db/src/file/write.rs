@@ -31,7 +31,8 @@ pub fn write_index(
     let proportions: Vec<f64> = database.clips.iter().flat_map(|c| c.proportions.iter().copied()).collect();
     out.section("proportions", bytemuck::cast_slice(&proportions))?;
     let zeros = vec![0.0f32; database.num_dofs()];
-    let zero_pose = |c: &'_ crate::ClipInfo| if c.zero_pose.is_empty() { zeros.clone() } else { c.zero_pose.clone() };
+    let zero_pose =
+        |c: &'_ crate::ClipInfo| if c.zero_pose.is_empty() { zeros.clone() } else { c.zero_pose.clone() };
     let zero_poses: Vec<f32> = database.clips.iter().flat_map(zero_pose).collect();
     out.section("zero poses", bytemuck::cast_slice(&zero_poses))?;
     let windows = match window {
