@@ -30,7 +30,7 @@ pub use chunks::{Chunk, Merged, merge, plan_chunks};
 pub use error::Error;
 pub use kinematics::{ControlPoint, control_points};
 pub use live::{Live, LivePose, MAX_LIVE_STATE_BYTES};
-pub use parameters::{Covariance, Method, Parameters};
+pub use parameters::{Covariance, Method, Parameters, Search};
 pub use reconstruct::{FrameQuality, Reconstruction, Reconstructor, control_table};
 pub use session::Session;
 pub use stage::Stage;

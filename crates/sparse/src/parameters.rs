@@ -67,6 +67,17 @@ pub enum Covariance {
     Diagonal,
 }
 
+/// How a frame's neighbours are searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Search {
+    /// all of them: every window is considered
+    #[default]
+    Exact,
+    /// nearly all of them, along the neighbour graph from those of the frame before: for large databases
+    Fast,
+}
+
 /// Everything that a reconstruction can choose. Missing fields take their defaults; unknown ones are refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -77,6 +88,8 @@ pub struct Parameters {
     pub window: usize,
     /// number of neighbours K (2 to 1024)
     pub neighbours: usize,
+    /// how they are searched
+    pub search: Search,
     /// whether control points join the neighbour search and the regression
     pub control_points_in_query: bool,
     /// degrees that one centimetre between control points counts for in the search and the regression
@@ -142,6 +155,7 @@ impl Default for Parameters {
             method: Method::default(),
             window: 2,
             neighbours: 64,
+            search: Search::default(),
             control_points_in_query: true,
             control_weight: 1.0,
             skeleton_weight: 2.0,

@@ -15,7 +15,7 @@ use crate::examples::ExampleBuffer;
 use crate::methods::predictor;
 use crate::uncertainty::Uncertainty;
 use crate::zero_pose::Information;
-use crate::{Covariance, Parameters, Reconstructor, Result, Stage};
+use crate::{Covariance, Parameters, Reconstructor, Result, Search, Stage};
 
 /// Standard deviations of samples are taken into this range, metres: beyond it the solver's arithmetic ends.
 const MIN_SIGMA_M: f64 = 1e-5;
@@ -358,7 +358,8 @@ impl<'a> Tracker<'a> {
             for p in 0..points {
                 let position = at.and_then(|f| trajectories.position(f, p));
                 let local = position.map_or_else(Vector3::zeros, |w| frame.local_from_world(&(w - floor)));
-                let sigma = at.and_then(|f| trajectories.sigma(f, p)).unwrap_or(self.parameters.control_sigma_m);
+                let sigma =
+                    at.and_then(|f| trajectories.sigma(f, p)).unwrap_or(self.parameters.control_sigma_m);
                 let weight = AROUND_WEIGHT * self.parameters.control_weight;
                 self.compare(points * (1 + block) + p, &local, position.map(|_| sigma), weight);
             }
@@ -395,7 +396,13 @@ impl<'a> Tracker<'a> {
         let query =
             Query { features: &self.query_single, controls, exclude: self.exclude, hints: &track.matches };
         self.begin(Stage::Search);
-        self.index.nearest(&query, self.parameters.neighbours, &mut self.search, &mut self.neighbours);
+        let (k, scratch, found) = (self.parameters.neighbours, &mut self.search, &mut self.neighbours);
+        match self.parameters.search {
+            Search::Exact => self.index.nearest(&query, k, scratch, found),
+            Search::Fast => {
+                self.index.nearest_fast(&query, k, scratch, found);
+            }
+        }
     }
 
     fn predict(&mut self) {
