@@ -1,7 +1,7 @@
 //! `marey bench`: how fast the parts are, on motion of your own.
 
-mod reconstruct;
 mod live;
+mod reconstruct;
 mod search;
 
 /// `marey bench`
