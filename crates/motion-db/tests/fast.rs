@@ -52,7 +52,7 @@ fn of_the_windows_nearest_to_other_performers_99_of_100_are_found() {
         let skeleton = clip.motion.skeleton();
         let kinematics = database.kinematics(skeleton);
         let points = PointSet::new(&kinematics, control_points(skeleton, &SIX).unwrap());
-        let table = ControlTable::new(&database, &index, skeleton, &kinematics, &points);
+        let table = ControlTable::new(&database, &index, skeleton, &kinematics, &points, &[], &[]);
         let mut weights = vec![1.0f32; 3 * SIX.len() + 1];
         weights[3 * SIX.len()] = 4.0;
         let mut hints = [Vec::new(), Vec::new()];
