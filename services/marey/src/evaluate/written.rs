@@ -6,7 +6,7 @@ use anyhow::Context;
 use evaluation::{
     ALL, Case, Row, SparseEvaluation, TrialResult, poses_at_60,
     report::{About, sparse_report},
-    tables::{Table, comparison_tables, papers, table, tables},
+    tables::{Table, comparison_tables, papers, reference, table, tables},
 };
 use serde::Serialize;
 use serde_json::Value;
@@ -106,7 +106,10 @@ impl Outcome<'_> {
 
     fn print_papers(&self) {
         println!("\nbeside the paper (local regression, trial out, its own database):");
-        for row in self.rows.iter().filter(|r| r.action == ALL && is_plain(r)) {
+        let Some(reference) = reference(self.rows) else { return };
+        let is_plain =
+            |r: &&Row| r.case == Case { method: r.case.method, points: r.case.points, ..reference.clone() };
+        for row in self.rows.iter().filter(|r| r.action == ALL).filter(is_plain) {
             let method = row.case.method.to_string();
             let Some(paper) = papers::for_points(&method, row.case.points) else { continue };
             if method == papers::METHODS[3] {
@@ -173,11 +176,6 @@ pub fn command() -> String {
         .map(|(i, argument)| if i == 0 { "marey".to_owned() } else { quoted(argument) })
         .collect::<Vec<_>>()
         .join(" ")
-}
-
-/// Whether a row is about points measured exactly and without gaps, with the parameters as given.
-fn is_plain(row: &Row) -> bool {
-    row.case.variant.is_empty() && row.case.noise_mm == 0.0 && row.case.occlusion.is_none()
 }
 
 /// An argument as a shell would want it.
