@@ -155,7 +155,8 @@ impl Outcome<'_> {
         }
         About {
             title: "How well motion is reconstructed".to_owned(),
-            introduction: "Full-body motion was reconstructed from a few points of each recorded trial and compared with what was                            recorded."
+            introduction: "Full-body motion was reconstructed from a few points of each recorded trial and compared with \
+                           what was recorded."
                 .to_owned(),
             facts,
             command: command(),
