@@ -164,7 +164,8 @@ impl<'a> Bench<'a> {
     /// A database without what the protocol leaves out for this trial: nothing in it, nor what is learned of performers,
     /// has seen the trial.
     fn allowed(&self, clip: &Clip) -> Result<Allowed, motion_db::Error> {
-        let leaves_out = |other: &ClipInfo| self.evaluation.protocol.leaves_out(&clip.name, &clip.subject, other);
+        let leaves_out =
+            |other: &ClipInfo| self.evaluation.protocol.leaves_out(&clip.name, &clip.subject, other);
         let database = self.database.without(leaves_out)?;
         let index = WindowIndex::new(&database, self.window)?;
         Ok(Allowed { database, index })
