@@ -7,7 +7,7 @@ use std::{collections::HashSet, fs, io::BufWriter, path::PathBuf, time::Instant}
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
-use motion_db::{Augment, Clip, IndexFile, MotionDatabase, WindowIndex, write_index};
+use motion_db::{Augment, Clip, IndexFile, MotionDatabase, write_index};
 use serde::Serialize;
 use service::AllCores;
 
