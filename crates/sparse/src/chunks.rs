@@ -45,6 +45,9 @@ pub struct Merged {
     pub motion: Motion,
     /// shape `[frames]`
     pub quality: Vec<FrameQuality>,
+    /// standard deviations of the smooth coordinates of every frame (see [`crate::Reconstruction`]), metres and radians,
+    /// shape `[frames, dofs]`
+    pub sigmas: Vec<f64>,
 }
 
 /// Puts chunks together: over the first `blend_frames` of a chunk's own frames, the chunk before is faded out.
@@ -66,17 +69,20 @@ pub fn merge(
     }
     let mut coordinates = vec![0.0; frames * dofs];
     let mut quality = Vec::with_capacity(frames);
+    let mut sigmas = Vec::with_capacity(frames * dofs);
     let mut blended = vec![0.0; dofs];
     for (chunk, part) in chunks.iter().zip(reconstructions) {
         let found = part.first_frame + part.quality.len();
         if part.first_frame != chunk.frames.start
             || found != chunk.frames.end
             || part.coordinates.len() != part.quality.len() * dofs
+            || part.sigmas.len() != part.coordinates.len()
         {
             return Err(Error::Chunks { found, expected: chunk.frames.end });
         }
         let own = chunk.keep.start - part.first_frame;
         quality.extend_from_slice(&part.quality[own..own + chunk.keep.len()]);
+        sigmas.extend_from_slice(&part.sigmas[own * dofs..(own + chunk.keep.len()) * dofs]);
         for (i, frame) in (chunk.keep.start..chunk.frames.end).enumerate() {
             let new = &part.coordinates[(own + i) * dofs..][..dofs];
             let out = &mut coordinates[frame * dofs..][..dofs];
@@ -100,7 +106,7 @@ pub fn merge(
         database.parametrisation().pose_from_coordinates(&session.skeleton, x, previous, &mut rest[..dofs]);
     }
     let motion = Motion::new(session.skeleton.clone(), FRAME_RATE, values)?;
-    Ok(Merged { motion, quality })
+    Ok(Merged { motion, quality, sigmas })
 }
 
 /// 0 to 1 with flat ends.

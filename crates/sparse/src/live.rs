@@ -169,7 +169,9 @@ impl<'a> Live<'a> {
             }
             return;
         }
-        self.contest.advance(self.reconstructor, &self.recent, &self.tracker, &mut self.leader, step);
+        if self.contest.advance(self.reconstructor, &self.recent, &self.tracker, &mut self.leader, step) {
+            self.uncertainty.restart();
+        }
     }
 
     fn write_pose(&mut self) {

@@ -284,7 +284,12 @@ impl<'a> Reconstructor<'a> {
     /// The best of several beginnings at `frame` (method §2, mend 8): database poses whose control points fit the
     /// coming frames, each run over these frames, and `current` among them if there is one. The one that makes the
     /// measurements most probable wins.
-    pub(crate) fn start(&self, tracker: &mut Tracker<'_>, frame: usize, current: Option<Track>) -> Result<Track> {
+    pub(crate) fn start(
+        &self,
+        tracker: &mut Tracker<'_>,
+        frame: usize,
+        current: Option<Track>,
+    ) -> Result<Track> {
         tracker.begin(Stage::Start);
         let trajectories = &self.session.trajectories;
         // Without two measured points there is nothing to fit: look at the first frame that has them.
@@ -315,8 +320,7 @@ impl<'a> Reconstructor<'a> {
         for (part, keep) in [(first..first + ahead / 3, FINALISTS), (first + ahead / 3..first + ahead, 1)] {
             for probe in &mut probes {
                 for f in part.clone() {
-                    probe.surprise +=
-                        tracker.step(&mut probe.now, self.observed(f)).solution.surprise();
+                    probe.surprise += tracker.step(&mut probe.now, self.observed(f)).solution.surprise();
                 }
             }
             probes.sort_by(|a, b| a.surprise.total_cmp(&b.surprise));

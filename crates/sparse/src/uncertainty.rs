@@ -28,6 +28,19 @@ impl Uncertainty {
         self.is_new = true;
     }
 
+    /// Variances of every coordinate, shape `[dofs]`; `None` before the first frame.
+    pub fn variances(&self) -> Option<&[f64]> {
+        (!self.is_new).then_some(&self.variances)
+    }
+
+    /// Goes on from [`Self::variances`] that were given out, of as many coordinates.
+    pub fn resume(&mut self, variances: Option<&[f64]>) {
+        self.is_new = variances.is_none();
+        if let Some(variances) = variances {
+            self.variances.copy_from_slice(variances);
+        }
+    }
+
     /// Takes in a frame, whose prior variance of coordinate d is `prior(d)`; `sigmas` holds the standard deviations of its
     /// posterior and receives those with what was uncertain before, shape `[dofs]`.
     pub fn update(&mut self, prior: impl Fn(usize) -> f64, sigmas: &mut [f64]) {

@@ -49,13 +49,18 @@ fn a_stream_that_is_resumed_gives_the_same_bits() {
     let session = walk(120);
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
+    // Pose, channels, and how well they are known.
+    let push = |live: &mut Live<'_>, frame: usize| {
+        let found = live.push(session.trajectories.samples(frame)).unwrap();
+        (found.coordinates.to_vec(), found.pose.to_vec(), found.quality, found.is_starting)
+    };
     let mut whole = Live::new(&reconstructor).unwrap();
-    let poses: Vec<_> = (0..120).map(|frame| push(&mut whole, &session, frame)).collect();
+    let poses: Vec<_> = (0..120).map(|frame| push(&mut whole, frame)).collect();
     // In the first heat, in a later one, and when all is decided.
     for cut in [5, 40, 100] {
         let mut first = Live::new(&reconstructor).unwrap();
         for frame in 0..cut {
-            push(&mut first, &session, frame);
+            push(&mut first, frame);
         }
         let state = first.state();
         assert!(state.len() < 16 << 10, "{} bytes", state.len());
@@ -63,25 +68,9 @@ fn a_stream_that_is_resumed_gives_the_same_bits() {
         second.resume(&state).unwrap();
         assert!(second.state() == state);
         for (frame, expected) in poses.iter().enumerate().skip(cut) {
-            assert_eq!(&push(&mut second, &session, frame), expected, "cut at {cut}, frame {frame}");
+            assert_eq!(&push(&mut second, frame), expected, "cut at {cut}, frame {frame}");
         }
     }
-}
-
-#[test]
-fn channels_do_not_jump_where_a_stream_was_resumed() {
-    let recorded = Recorded::new(&walks_and_runs());
-    let session = walk(101);
-    let parameters = Parameters::default();
-    let reconstructor = recorded.reconstructor(&session, &parameters);
-    let mut live = Live::new(&reconstructor).unwrap();
-    for frame in 0..100 {
-        push(&mut live, &session, frame);
-    }
-    let mut other = Live::new(&reconstructor).unwrap();
-    other.resume(&live.state()).unwrap();
-    let last = session.trajectories.samples(100);
-    assert_eq!(other.push(last).map(|p| p.pose.to_vec()), live.push(last).map(|p| p.pose.to_vec()));
 }
 
 #[test]

@@ -75,15 +75,17 @@ fn start(args: &Args, points: &[String]) -> anyhow::Result<Value> {
     if let Some(path) = &args.skeleton {
         start["skeleton_asf"] = fs::read_to_string(path).with_context(|| path.display().to_string())?.into();
     }
-    if !args.parameters.is_empty() {
-        start["parameters"] =
-            crate::run::pairs(&args.parameters, |v| serde_json::from_str(v).unwrap_or_else(|_| v.into()))?;
-    }
+    start["parameters"] = values(&args.parameters)?;
     if let Some(path) = args.state_file.as_ref().filter(|path| path.exists()) {
         let state = fs::read(path).with_context(|| path.display().to_string())?;
         start["state"] = BASE64_STANDARD.encode(state).into();
     }
     Ok(start)
+}
+
+/// `NAME=VALUE` options as parameters: numbers and true where they read as such, else words.
+pub fn values(options: &[String]) -> anyhow::Result<Value> {
+    crate::run::pairs(options, |v| serde_json::from_str(v).unwrap_or_else(|_| v.into()))
 }
 
 async fn follow(args: &Args, source: Source, connection: Connection) -> anyhow::Result<()> {

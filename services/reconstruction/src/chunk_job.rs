@@ -45,7 +45,8 @@ impl Handler for ChunkHandler {
         let (frames, of) = (payload.end.saturating_sub(payload.start), job.clone());
         let reconstruction = compute::run(move || -> Result<_, InputError> {
             let session = Session::from_bytes(&session)?;
-            let reconstructor = prior.reconstructor(&session, &payload.parameters)?;
+            let mut reconstructor = prior.reconstructor(&session, &payload.parameters)?;
+            reconstructor.learn_zero_pose()?;
             let mut progress = |done: usize| {
                 if of.is_cancelled() {
                     return ControlFlow::Break(());

@@ -2,7 +2,7 @@
 
 use crate::feet::Finished;
 use kinematics::{Kinematics, Parametrisation};
-use model::Motion;
+use model::{ChannelKind, Motion};
 use std::fmt::Write as _;
 
 /// A result's name, its media type, and how it is written.
@@ -19,7 +19,7 @@ const TEXT: &str = "text/plain; charset=utf-8";
 const CSV: &str = "text/csv; charset=utf-8";
 
 /// All of them, made one after the other so that only one is in memory at a time.
-pub(crate) const EXPORTS: [Export; 6] = [
+pub(crate) const EXPORTS: [Export; 7] = [
     Export { name: "motion.bvh", media_type: TEXT, write: |m| formats::bvh::write(&m.merged.motion) },
     Export { name: "motion.amc", media_type: TEXT, write: |m| formats::amc::write(&m.merged.motion) },
     Export {
@@ -30,6 +30,7 @@ pub(crate) const EXPORTS: [Export; 6] = [
     Export { name: "poses.csv", media_type: CSV, write: |m| formats::motion_csv::write(&m.merged.motion) },
     Export { name: "positions.csv", media_type: CSV, write: |m| positions(&m.merged.motion) },
     Export { name: "quality.csv", media_type: CSV, write: quality },
+    Export { name: "sigma.csv", media_type: CSV, write: sigmas },
 ];
 
 /// Positions of all joints: `frame,time,root_x,root_y,root_z,…`; seconds and metres, y up.
@@ -93,6 +94,33 @@ fn quality(finished: &Finished) -> String {
     out
 }
 
+/// How sure every coordinate is, one standard deviation: metres for the root's place, degrees for everything that turns. A
+/// joint with three rotations has the components of its rotation vector, x, y, z.
+fn sigmas(finished: &Finished) -> String {
+    let motion = &finished.merged.motion;
+    let dofs = motion.skeleton().num_dofs();
+    let is_angle: Vec<bool> = motion
+        .skeleton()
+        .joints()
+        .iter()
+        .flat_map(|j| &j.channels)
+        .map(|c| c.kind == ChannelKind::Rotation)
+        .collect();
+    let mut out = String::from("frame,time");
+    for name in motion.skeleton().dof_names() {
+        let _ = write!(out, ",{}", quoted(&name).replace('\u{0}', ""));
+    }
+    out.push('\n');
+    for (frame, row) in finished.merged.sigmas.chunks_exact(dofs.max(1)).enumerate() {
+        let _ = write!(out, "{frame},{:.6}", frame as f64 / motion.frame_rate());
+        for (sigma, is_angle) in row.iter().zip(&is_angle) {
+            let _ = write!(out, ",{:.4}", if *is_angle { sigma.to_degrees() } else { *sigma });
+        }
+        out.push('\n');
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,8 +159,11 @@ mod tests {
             neighbour_distance_deg: 2.0,
             measured_points: 6,
         };
-        let merged = Merged { motion: motion("root"), quality: vec![q] };
-        let text = quality(&Finished { merged, feet: None });
+        let merged =
+            Merged { motion: motion("root"), quality: vec![q], sigmas: vec![0.01, 0.5f64.to_radians()] };
+        let finished = Finished { merged, feet: None };
+        assert_eq!(sigmas(&finished).lines().nth(1), Some("0,0.000000,0.0100,0.5000"));
+        let text = quality(&finished);
         assert_eq!(text.lines().nth(1), Some("0,0.000000,6,0.0010000,0.0500000,1.500000,2.000000,,,"));
     }
 }

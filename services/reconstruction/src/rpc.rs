@@ -5,7 +5,7 @@ use kinematics::{Kinematics, Parametrisation, control_points};
 use model::{PointTrajectories, Skeleton};
 use proto::v1::{self, reconstruction_server::Reconstruction};
 use service::compute;
-use sparse::{Merged, Parameters, Reconstructor, Session};
+use sparse::{Merged, Parameters, Session};
 use std::{ops::ControlFlow, sync::Arc};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
@@ -103,7 +103,8 @@ fn solve(
     let frames = session.num_frames();
     // One chunk, however long the frames are at 60 a second.
     let parameters = Parameters { chunk_frames: frames.max(60), ..parameters.clone() };
-    let reconstructor = Reconstructor::new(&prior.database, &prior.index, &session, &parameters)?;
+    let mut reconstructor = prior.reconstructor(&session, &parameters)?;
+    reconstructor.learn_zero_pose()?;
     let mut progress =
         |_| if gone.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
     let found = reconstructor.reconstruct(0..frames, &mut progress)?;

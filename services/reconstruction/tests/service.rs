@@ -248,6 +248,7 @@ async fn a_session_comes_back_as_motion_files_near_the_truth() {
             "positions.csv",
             "quality.csv",
             "run.json",
+            "sigma.csv",
             "skeleton.asf"
         ]
     );

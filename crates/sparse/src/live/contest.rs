@@ -151,14 +151,18 @@ impl Contest {
         let Phase::Heat { left } = self.phase else { return };
         let counts = left + WARM_FRAMES <= self.heat_frames;
         for challenger in &mut self.challengers[..self.active] {
-            let surprise = tracker.step(&mut challenger.track, Observed { now: samples, session: None }).solution.surprise();
+            let surprise = tracker
+                .step(&mut challenger.track, Observed { now: samples, session: None })
+                .solution
+                .surprise();
             if counts {
                 challenger.surprise += surprise;
             }
         }
     }
 
-    /// After a frame in which the leader made `step`: searches on, or goes on with the heat.
+    /// After a frame in which the leader made `step`: searches on, or goes on with the heat. Whether somebody else leads
+    /// now.
     pub fn advance(
         &mut self,
         reconstructor: &Reconstructor<'_>,
@@ -166,7 +170,7 @@ impl Contest {
         tracker: &Tracker<'_>,
         leader: &mut Track,
         step: &Step,
-    ) {
+    ) -> bool {
         match self.phase {
             Phase::Over => {}
             Phase::Search => {
@@ -184,24 +188,26 @@ impl Contest {
                 }
                 self.phase = Phase::Heat { left: left - 1 };
                 if left <= 1 {
-                    self.end_heat(leader);
+                    let is_other = self.end_heat(leader);
                     if self.tried < self.candidates {
                         self.begin_search(recent);
                     } else {
                         self.end();
                     }
+                    return is_other;
                 }
             }
         }
+        false
     }
 
-    fn end_heat(&mut self, leader: &mut Track) {
+    /// The best leads on; whether it is somebody else.
+    fn end_heat(&mut self, leader: &mut Track) -> bool {
         let challengers = self.challengers[..self.active].iter();
-        if let Some(best) = challengers.min_by(|a, b| a.surprise.total_cmp(&b.surprise))
-            && best.surprise < self.leader_surprise
-        {
-            leader.copy_from(&best.track);
-        }
+        let best = challengers.min_by(|a, b| a.surprise.total_cmp(&b.surprise));
+        let Some(best) = best.filter(|best| best.surprise < self.leader_surprise) else { return false };
+        leader.copy_from(&best.track);
+        true
     }
 }
 

@@ -31,12 +31,25 @@ struct Header {
     /// frames of recent measurements
     recent: usize,
     has_pose: bool,
+    has_variances: bool,
     lost: usize,
     contest: ContestRecord,
     /// rows that matched last, of the leader and of the challengers
     matches: Vec<Vec<usize>>,
     leader_surprise: f64,
     surprises: Vec<f64>,
+}
+
+/// What a state says, checked.
+struct Known {
+    header: Header,
+    /// the leader, if there is one, and the challengers
+    tracks: Vec<Track>,
+    /// the last pose in channels
+    pose: Option<Vec<f64>>,
+    variances: Option<Vec<f64>>,
+    /// shape `[frames, points]`, oldest first
+    recent: Vec<Vector3<f64>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -62,6 +75,7 @@ impl Live<'_> {
             points: self.positions.len(),
             recent: self.recent.len(),
             has_pose: self.has_pose,
+            has_variances: self.uncertainty.variances().is_some(),
             lost: self.lost,
             contest: ContestRecord {
                 is_over: self.contest.is_over(),
@@ -79,6 +93,7 @@ impl Live<'_> {
         if self.has_pose {
             writer.numbers(&self.pose);
         }
+        writer.numbers(self.uncertainty.variances().unwrap_or_default());
         for age in (0..self.recent.len()).rev() {
             for position in self.recent.frame(age) {
                 writer.numbers(position.as_slice());
@@ -96,13 +111,14 @@ impl Live<'_> {
     /// If the bytes are something else, damaged, of something else, or hold numbers that no stream comes to. Nothing is
     /// changed then.
     pub fn resume(&mut self, state: &[u8]) -> Result<()> {
-        let (header, tracks, pose, recent) = self.read(state)?;
+        let Known { header, tracks, pose, variances, recent } = self.read(state)?;
         self.forget();
         self.has_pose = header.has_pose;
         self.lost = header.lost;
         if let Some(pose) = pose {
             self.pose.copy_from_slice(&pose);
         }
+        self.uncertainty.resume(variances.as_deref());
         for frame in recent.chunks_exact(self.positions.len()) {
             self.recent.push(frame);
         }
@@ -135,11 +151,7 @@ impl Live<'_> {
         self.has_leader.then_some(&self.leader).into_iter().chain(challengers).collect()
     }
 
-    #[expect(
-        clippy::type_complexity,
-        reason = "the parts of a state, taken apart at once by the only caller"
-    )]
-    fn read(&self, state: &[u8]) -> Result<(Header, Vec<Track>, Option<Vec<f64>>, Vec<Vector3<f64>>)> {
+    fn read(&self, state: &[u8]) -> Result<Known> {
         if state.len() > MAX_LIVE_STATE_BYTES {
             return Err(wrong(
                 format!("{} bytes long", state.len()),
@@ -162,6 +174,8 @@ impl Live<'_> {
         }
         let pose = header.has_pose.then(|| reader.numbers(Some(dofs))).transpose()?;
         check_numbers(pose.as_deref().unwrap_or_default())?;
+        let variances = header.has_variances.then(|| reader.numbers(Some(dofs))).transpose()?;
+        check_variances(variances.as_deref().unwrap_or_default())?;
         let numbers = reader.numbers(header.recent.checked_mul(3 * points))?;
         reader.end()?;
         let recent: Vec<_> = numbers.as_chunks::<3>().0.iter().map(|p| Vector3::from(*p)).collect();
@@ -169,7 +183,7 @@ impl Live<'_> {
         if let Some(far) = numbers.iter().find(|v| v.abs() > MAX_DISTANCE_M) {
             return Err(wrong(format!("with a measurement at {far} m"), "at most 100 km"));
         }
-        Ok((header, tracks, pose, recent))
+        Ok(Known { header, tracks, pose, variances, recent })
     }
 
     fn check(&self, header: &Header) -> Result<()> {
@@ -226,6 +240,13 @@ impl Live<'_> {
 fn check_numbers(numbers: &[f64]) -> Result<()> {
     match numbers.iter().find(|v| !(v.abs() <= MAX_COORDINATE)) {
         Some(found) => Err(wrong(format!("with a coordinate of {found}"), "at most a million")),
+        None => Ok(()),
+    }
+}
+
+fn check_variances(variances: &[f64]) -> Result<()> {
+    match variances.iter().find(|v| !(0.0..=MAX_COORDINATE).contains(*v)) {
+        Some(found) => Err(wrong(format!("with a variance of {found}"), "0 to a million")),
         None => Ok(()),
     }
 }

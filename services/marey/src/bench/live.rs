@@ -18,7 +18,7 @@ use crate::{
     connection::Server,
     database,
     evaluate::motions,
-    live::{Connection, Latency, frame_message},
+    live::{Connection, Latency, frame_message, values},
     sample::Trials,
     serve::runtime,
     watch,
@@ -60,6 +60,9 @@ pub struct Args {
     /// Use this database of a server that runs
     #[arg(long)]
     database: Option<String>,
+    /// Parameter of the method: NAME=VALUE; may be given often
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    parameters: Vec<String>,
     /// Send the frames of all streams at the same moment, instead of evenly spread
     #[arg(long)]
     aligned: bool,
@@ -186,7 +189,8 @@ async fn stream_all(
     let mut streams = Vec::new();
     for performer in performers {
         let points = &POINTS[..usize::from(args.points)];
-        let start = json!({ "type": "start", "points": points, "skeleton_asf": performer.skeleton_asf });
+        let mut start = json!({ "type": "start", "points": points, "skeleton_asf": performer.skeleton_asf });
+        start["parameters"] = values(&args.parameters)?;
         streams.push((Connection::open(server, database, &start).await?, performer.frames));
     }
     let begin = Instant::now() + Duration::from_millis(100);
