@@ -35,19 +35,6 @@ pub use eliminate::{eliminate, solve_upper};
 pub use products::{gram, products, selected_product, self_product, transposed_product};
 pub use rows::{add_scaled, inner_product, weighted_sum};
 
-#[cfg(test)]
-mod tests_numbers {
-    /// Deterministic numbers in [-1, 1].
-    pub fn numbers(count: usize, seed: u64) -> Vec<f64> {
-        let mut state = seed;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-        };
-        (0..count).map(|_| next()).collect()
-    }
-}
-
 /// What numbers of columns are padded to where a function says so.
 pub const PAD: usize = 16;
 /// What numbers of rows are padded to in [`eliminate`].
@@ -63,4 +50,17 @@ pub const fn padded(count: usize, of: usize) -> usize {
 pub const fn stride(columns: usize) -> usize {
     let lines = columns.div_ceil(8);
     8 * (lines + (lines + 1) % 2)
+}
+
+#[cfg(test)]
+mod tests_numbers {
+    /// Deterministic numbers in [-1, 1].
+    pub fn numbers(count: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
+        };
+        (0..count).map(|_| next()).collect()
+    }
 }

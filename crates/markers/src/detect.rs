@@ -79,7 +79,10 @@ fn fit<'a>(map: &'a MarkerMap, names: &[String], prefix: &str) -> Fit<'a> {
             missing: group.markers.iter().filter(|n| find(n).is_none()).cloned().collect(),
         });
         // the first whole one, else the one of which most is there
-        let best = choices.min_by_key(|c| (!c.missing.is_empty(), std::cmp::Reverse(c.found.len())));
+        let best = choices.min_by_key(|c| match c.missing.is_empty() {
+            true => (false, std::cmp::Reverse(0)),
+            false => (true, std::cmp::Reverse(c.found.len())),
+        });
         best.unwrap_or(PointFit { name: point.name.clone(), found: Vec::new(), missing: Vec::new() })
     };
     let num_known = map.markers.iter().filter(|name| find(name).is_some()).count();

@@ -66,7 +66,7 @@ impl PointTrajectories {
         if !sigmas.is_empty() && sigmas.len() != self.positions.len() {
             return Err(Error::SigmaCount { sigmas: sigmas.len(), positions: self.positions.len() });
         }
-        if let Some(at) = sigmas.iter().position(|s| !s.is_nan() && !(s.is_finite() && *s > 0.0)) {
+        if let Some(at) = sigmas.iter().position(|s| !(s.is_nan() || s.is_finite() && *s > 0.0)) {
             let points = self.names.len().max(1);
             let point = self.names[at % points].clone();
             return Err(Error::Sigma { frame: at / points, point, found: sigmas[at] });

@@ -28,7 +28,8 @@ impl MotionDatabase {
         Ok(self.num_poses() - before)
     }
 
-    /// Adds clip number `clip` of a database in the same coordinates, under the name `name`.
+    /// Adds clip number `clip` of a database in the same coordinates, under the name `name`. Its performer's zero pose is
+    /// another one among other performers: [`Self::learn_zero_poses`] when all clips are there.
     ///
     /// # Errors
     /// If the coordinates are others, or there are too many poses.
@@ -44,6 +45,7 @@ impl MotionDatabase {
         self.coordinates.to_mut().extend_from_slice(&other.coordinates[poses]);
         info.first_pose = first_pose;
         info.name = name.to_owned();
+        info.zero_pose.clear();
         self.clips.push(info);
         Ok(())
     }

@@ -199,5 +199,7 @@ fn put_together(list: &ShardList, shards: &[Arc<MotionDatabase>]) -> Result<Moti
             _ => return Err(Error::List(format!("has clip {:?} that its shard has not", clip.name))),
         }
     }
+    // As when it is built undivided.
+    whole.learn_zero_poses();
     Ok(whole)
 }

@@ -111,7 +111,15 @@ impl BuildHandler {
         let mut stored = Vec::with_capacity(num_shards);
         let mut last = None;
         for shard in 0..num_shards {
-            let database = self.gather(job, payload, sources, &shard_of, (shard, num_shards)).await?;
+            let mut database = self.gather(job, payload, sources, &shard_of, (shard, num_shards)).await?;
+            if num_shards == 1 {
+                // Shards keep what was recorded: zero poses are learned of all performers at once, when they are put together.
+                database = compute::run(move || {
+                    database.learn_zero_poses();
+                    Ok::<_, JobError>(database)
+                })
+                .await?;
+            }
             let (skeleton, num_dofs) = (database.skeleton().clone(), database.num_dofs());
             job.progress((shard as f64 + 0.9) / num_shards as f64, "writing the index");
             let name = if num_shards == 1 { INDEX.to_owned() } else { format!("{shard:03}.mdb") };

@@ -87,9 +87,10 @@ impl Linearisation {
             }
         }
         if let Some(onwards) = terms.onwards {
-            for q in 0..dofs {
-                self.spread[q] += terms.smoothness;
-                self.pull[q] += terms.smoothness * onwards[q];
+            let numbers = self.spread.iter_mut().zip(&mut self.pull).zip(onwards);
+            for ((spread, pull), onwards) in numbers {
+                *spread += terms.smoothness;
+                *pull += terms.smoothness * onwards;
             }
         }
         self.spread.iter_mut().for_each(|v| *v = 1.0 / *v);
