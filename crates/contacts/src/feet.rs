@@ -88,9 +88,11 @@ impl FootTracks {
         let mut slides = vec![None; self.positions.len()];
         for contact in contacts.all() {
             let end = contact.frames.end.min(self.positions.len());
-            for frame in contact.frames.start + 1..end {
+            let begin = contact.frames.start + 1;
+            let of_contact = slides.iter_mut().enumerate().take(end).skip(begin);
+            for (frame, slide) in of_contact {
                 let speed = self.step_cm_s(frame, contact.point);
-                let slide: &mut Option<f64> = &mut slides[frame];
+                let slide: &mut Option<f64> = slide;
                 *slide = Some(slide.map_or(speed, |other| other.max(speed)));
             }
         }

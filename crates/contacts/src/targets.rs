@@ -23,10 +23,11 @@ pub fn moves(tracks: &FootTracks, contacts: &Contacts, ramp: usize) -> Vec<[Opti
     for contact in contacts.all() {
         let place = place(tracks, contact);
         let Range { start, end } = contact.frames;
-        for frame in start.saturating_sub(ramp)..(end + ramp).min(frames) {
+        let near = sums.iter_mut().enumerate().take(end + ramp).skip(start.saturating_sub(ramp));
+        for (frame, sums) in near {
             let nearest = frame.clamp(start, end - 1);
             let weight = smooth_step(1.0 - frame.abs_diff(nearest) as f64 / (ramp + 1) as f64);
-            let (sum, total) = &mut sums[frame][contact.point];
+            let (sum, total) = &mut sums[contact.point];
             *sum += (place - tracks.positions[nearest][contact.point]) * weight;
             *total += weight;
         }

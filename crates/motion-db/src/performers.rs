@@ -12,6 +12,8 @@ use crate::{FeatureScale, HeadingFrame, MotionDatabase};
 
 /// Skeletons that differ by less in every number are one performer's, metres.
 const SAME_SKELETON_M: f64 = 1e-3;
+/// From fewer performers it cannot be told what is a zero pose and what a way of moving: none is learned.
+const MIN_PERFORMERS: usize = 6;
 /// Poses of a performer that are compared with those of others, at most.
 const SAMPLES: usize = 100;
 /// The same for all performers together: comparing takes the square of it.
@@ -81,13 +83,13 @@ impl MotionDatabase {
     }
 
     /// Learns the zero pose of every performer and keeps it with their clips: from then on, poses, windows and searches are
-    /// those of an average performer.
+    /// those of an average performer. With fewer than six performers nothing is learned.
     ///
     /// Poses are matched with the most similar ones of every other performer. Offsets `o` are chosen to make the
     /// differences of matched poses small, `Σ w ‖(q_i − o_p) − (q_j − o_r)‖² + λ Σ‖o_p‖²`, and the poses matched again.
     pub fn learn_zero_poses(&mut self) {
         let (of_clip, count) = self.performers();
-        if count < 2 {
+        if count < MIN_PERFORMERS {
             self.clips.iter_mut().for_each(|c| c.zero_pose.clear());
             return;
         }
@@ -171,7 +173,9 @@ impl MotionDatabase {
             }
         }
         mean.iter_mut().for_each(|m| *m /= weights);
-        for d in (0..dofs).filter(|d| *d > HEADING && self.parametrisation.is_angle(*d)) {
+        let is_learned = self.clips.iter().any(|c| !c.zero_pose.is_empty());
+        let free = |d: &usize| is_learned && *d > HEADING && self.parametrisation.is_angle(*d);
+        for d in (0..dofs).filter(free) {
             covariance[d * dofs + d] += MIN_SIGMA * MIN_SIGMA;
         }
         if let Some(known) = known {

@@ -238,7 +238,7 @@ impl Live<'_> {
 }
 
 fn check_numbers(numbers: &[f64]) -> Result<()> {
-    match numbers.iter().find(|v| !(v.abs() <= MAX_COORDINATE)) {
+    match numbers.iter().find(|v| v.is_nan() || v.abs() > MAX_COORDINATE) {
         Some(found) => Err(wrong(format!("with a coordinate of {found}"), "at most a million")),
         None => Ok(()),
     }
