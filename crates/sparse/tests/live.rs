@@ -168,7 +168,7 @@ fn frames_take_no_memory_and_starts_take_none_either() {
     let parameters = Parameters::default();
     let reconstructor = recorded.reconstructor(&session, &parameters);
     let mut live = Live::new(&reconstructor).unwrap();
-    let nowhere = vec![Vector3::repeat(f64::NAN); 6];
+    let nowhere = [Vector3::repeat(f64::NAN); 6];
     for frame in 0..3 {
         live.push(session.trajectories.samples(frame));
     }

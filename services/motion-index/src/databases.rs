@@ -39,7 +39,7 @@ enum DerivedKey {
 
 #[derive(Debug)]
 enum Derived {
-    Windows(WindowIndex),
+    Windows(Box<WindowIndex>),
     Points(search::PointTable),
 }
 
@@ -120,7 +120,10 @@ impl Databases {
         let key = DerivedKey::Windows { part, window };
         let derived = self.derived(key, search::window_bytes(&database, window), "the index of windows", {
             let database = database.clone();
-            move || Ok(Derived::Windows(WindowIndex::with_threads(&database, window, &AllCores)?))
+            move || {
+                let index = WindowIndex::with_threads(&database, window, &AllCores)?;
+                Ok(Derived::Windows(Box::new(index)))
+            }
         });
         let derived = derived.await?;
         compute::run(move || match &*derived {

@@ -47,7 +47,7 @@ impl LinePlot<'_> {
         let places = || self.series.iter().flat_map(|s| &s.places);
         let x_min = places().map(|p| p.x).fold(f64::INFINITY, f64::min);
         let x_max = places().map(|p| p.x).fold(f64::NEG_INFINITY, f64::max);
-        if !(x_max > x_min) {
+        if x_max.partial_cmp(&x_min) != Some(std::cmp::Ordering::Greater) {
             return String::new();
         }
         let y_top = places().map(|p| p.mean.max(p.high)).fold(1e-6, f64::max) * 1.05;
@@ -146,7 +146,7 @@ pub fn legend<'a>(names: impl Iterator<Item = &'a str>) -> String {
 
 /// A line without axes, as high as its largest value; `top` is the value that reaches the upper edge.
 pub fn sparkline(values: &[f64], top: f64) -> String {
-    if values.len() < 2 || !(top > 0.0) {
+    if values.len() < 2 || top.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
         return String::new();
     }
     let step = values.len().div_ceil(120);

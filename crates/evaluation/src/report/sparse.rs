@@ -139,7 +139,7 @@ impl<'a> View<'a> {
         for (name, case) in cases.iter().filter(|(_, case)| case.occlusion.is_some()) {
             let hidden: Vec<&TrialResult> = self.of_case(case);
             let whole = self.of_case(&self.reference);
-            let mut series = vec![Vec::new(), Vec::new()];
+            let mut series = [Vec::new(), Vec::new()];
             for result in &hidden {
                 let Some(gap) = &result.gap else { continue };
                 let Some(same) = whole.iter().find(|r| r.trial == result.trial) else { continue };
