@@ -141,6 +141,7 @@ pub fn feet(args: &Args) -> anyhow::Result<()> {
             let mean = |value: &dyn Fn(FootNumbers) -> f64| {
                 found.iter().map(|t| value(pick(&t.result))).sum::<f64>() / found.len().max(1) as f64
             };
+            let largest = format!("{:.1} m/s²", mean(&|n| n.largest_acceleration));
             println!(
                 "{points:<8}{name:<8}{:.3}°   {:.3} cm  {:<25}{:<17}{:<15}{}",
                 mean(&|n| n.rms_deg),
@@ -148,7 +149,7 @@ pub fn feet(args: &Args) -> anyhow::Result<()> {
                 format!("{:.2} cm/s", mean(&|n| n.slide_cm_s)),
                 format!("{:.2} cm/s", mean(&|n| n.own_slide_cm_s)),
                 format!("{:.2} m/s²", mean(&|n| n.acceleration)),
-                format!("{:.1} m/s²", mean(&|n| n.largest_acceleration)),
+                largest,
             );
         };
         row("true", &|r| r.truth);
