@@ -192,7 +192,7 @@ fn requests_that_make_no_sense_are_refused_by_name() -> Result<()> {
         ("", json!({"name": "x", "without": ["1_01"]}), 422, "base"),
         ("", json!({"name": "x", "base": "none"}), 404, "none"),
         ("", json!({"name": "x", "base": "walks", "without": ["no such"]}), 422, "no such"),
-        ("", json!({"name": "x", "base": "walks", "without": "1_01"}), 422, "without"),
+        ("", json!({"name": "x", "base": "walks", "without": "1_01"}), 422, "expected a sequence"),
         ("", json!({"name": "x", "base": "walks", "without": vec!["1_01"; 10_001]}), 422, "10001"),
         ("/walks/train", json!({"method": "nearest"}), 422, "nearest"),
         ("/walks/train", json!({"parameters": {"active": 1}}), 422, "active"),
