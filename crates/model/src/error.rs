@@ -91,4 +91,38 @@ pub enum Error {
         /// the value found
         found: f64,
     },
+    /// A camera that can't be.
+    #[error("camera {name}: {what}")]
+    Camera {
+        /// name of the camera
+        name: String,
+        /// what is wrong
+        what: String,
+    },
+    /// A vertex of a mesh is not finite.
+    #[error("vertex {vertex} is not finite")]
+    Vertex {
+        /// index of the vertex
+        vertex: usize,
+    },
+    /// A face names a vertex that isn't there.
+    #[error("face {face} has corners {found:?}, expected indices below {vertices}, the number of vertices")]
+    Face {
+        /// index of the face
+        face: usize,
+        /// its corners
+        found: [u32; 3],
+        /// vertices of the mesh
+        vertices: usize,
+    },
+    /// An image has not the pixels of its size.
+    #[error("found {found} pixels, expected {width} x {height}")]
+    PixelCount {
+        /// pixels found
+        found: usize,
+        /// pixels in a row
+        width: usize,
+        /// rows
+        height: usize,
+    },
 }

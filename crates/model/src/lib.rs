@@ -1,4 +1,4 @@
-//! The vocabulary of Marey: skeletons, poses, motions and point trajectories.
+//! The vocabulary of Marey: skeletons, poses, motions, point trajectories; cameras, silhouettes and meshes.
 //!
 //! Units inside the program: metres, seconds, radians; y is up; coordinates are right-handed. Files in
 //! other units are converted when they are read and written (crate `formats`).
@@ -12,18 +12,24 @@
 //! assert_eq!(motion.num_frames(), 2);
 //! ```
 
+mod camera;
 mod error;
 mod joint;
+mod mesh;
 mod motion;
 mod points;
 mod record;
+mod silhouette;
 mod skeleton;
 
+pub use camera::{Camera, Distortion};
 pub use error::Error;
 pub use joint::{Axis, Channel, ChannelKind, Joint};
+pub use mesh::Mesh;
 pub use motion::Motion;
 pub use points::{PointTrajectories, Samples};
 pub use record::SkeletonRecord;
+pub use silhouette::Silhouette;
 pub use skeleton::Skeleton;
 
 /// Result of the constructors of this crate.
