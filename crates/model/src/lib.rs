@@ -14,6 +14,7 @@
 
 mod camera;
 mod error;
+mod image;
 mod joint;
 mod mesh;
 mod motion;
@@ -24,6 +25,7 @@ mod skeleton;
 
 pub use camera::{Camera, Distortion};
 pub use error::Error;
+pub use image::Image;
 pub use joint::{Axis, Channel, ChannelKind, Joint};
 pub use mesh::Mesh;
 pub use motion::Motion;
