@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs what building and running Marey needs and this machine lacks: a C compiler and linker, and the
-# programs of a PostgreSQL server. Does nothing, quickly, where all is there. Never starts a server.
+# Installs what building and running Marey needs and this machine lacks: a C compiler and linker, the programs of
+# a PostgreSQL server, and ffmpeg, which reads videos. Does nothing, quickly, where all is there. Never starts a
+# server.
 set -euo pipefail
 
 say() { printf 'setup: %s\n' "$*" >&2; }
@@ -21,12 +22,13 @@ command -v cargo >/dev/null ||
 packages=()
 command -v cc >/dev/null || packages+=(gcc libc6-dev)
 has_server || packages+=(postgresql)
+command -v ffmpeg >/dev/null && command -v ffprobe >/dev/null || packages+=(ffmpeg)
 ((${#packages[@]})) || exit 0
 
 if ! command -v apt-get >/dev/null; then
     say "this machine lacks: ${packages[*]}; it is not Debian, so please install them yourself:"
-    say "  Fedora: dnf install gcc postgresql-server      Arch:  pacman -S gcc postgresql"
-    say "  Alpine: apk add build-base postgresql          macOS: xcode-select --install; brew install postgresql"
+    say "  Fedora: dnf install gcc postgresql-server ffmpeg-free   Arch:  pacman -S gcc postgresql ffmpeg"
+    say "  Alpine: apk add build-base postgresql ffmpeg            macOS: xcode-select --install; brew install postgresql ffmpeg"
     exit 1
 fi
 
