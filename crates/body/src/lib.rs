@@ -1,0 +1,36 @@
+//! The morphable body: a mesh whose shape was learned from registered scans, a skeleton inside it, and a skin that follows
+//! the skeleton (method §4; MM §3, eq. 1).
+//!
+//! `M(α) = m₀ + Σ α_i m_i`: up to 20 principal components, α in standard deviations of the population. The joints are a
+//! linear function of the vertices, so they follow the shape. A pose has 22 degrees of freedom: 6 of the root and 16
+//! angles. Vertices are moved by linear blend skinning with at most four joints a vertex.
+//!
+//! Convention: metres, radians, y up; in its rest pose the body faces +z and its left is +x. For joint j with rest position
+//! h_j and rotation R_j, the product of the rotations of its DOFs in their order about axes of the rest pose,
+//!
+//! ```text
+//! A_j = A_parent · T(h_j) · R_j · T(−h_j),     A_root = T(t) · T(h) · exp(r) · T(−h),     vertex = Σ_k w_k A_k v
+//! ```
+
+mod error;
+mod jacobian;
+mod limb;
+mod pose;
+mod regressor;
+mod rig;
+mod rig_json;
+mod shape;
+mod skin;
+
+pub use error::Error;
+pub use jacobian::ShapeDrift;
+pub use limb::Limb;
+pub use pose::Posed;
+pub use regressor::JointRegressor;
+pub use rig::{Dof, DofKind, ROOT_DOFS, Rig, RigJoint};
+pub use rig_json::RigFile;
+pub use shape::{BodyModel, MAX_COMPONENTS, MAX_VERTICES, ModelParts, Shape};
+pub use skin::Skin;
+
+/// Result of the fallible functions of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
