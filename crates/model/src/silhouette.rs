@@ -67,6 +67,11 @@ impl Silhouette {
         }
     }
 
+    /// Takes the person away.
+    pub fn clear(&mut self) {
+        self.words.fill(0);
+    }
+
     /// One row of words: pixel x is bit x % 64 of word x / 64.
     pub fn row(&self, y: usize) -> &[u64] {
         &self.words[y * self.words_per_row..(y + 1) * self.words_per_row]
