@@ -6,7 +6,11 @@ mod capture;
 
 use divan::Bencher;
 use model::Silhouette;
-use vision::{ContourOptions, DepthBuffer, DistanceField, Rasteriser, Topology, View, contours, find_rim};
+use nalgebra::Vector3;
+use vision::{
+    Chamfer, ContourOptions, DepthBuffer, DistanceField, Observed, Rasteriser, Topology, View, contours,
+    find_rim, reduced,
+};
 
 fn main() {
     divan::main();
@@ -51,4 +55,18 @@ fn distance_field(bencher: Bencher, scale: usize) {
 fn outlines(bencher: Bencher) {
     let Some(capture) = capture::frame_0("outlines") else { return };
     bencher.bench_local(|| contours(&capture.silhouettes[0], &ContourOptions::default()));
+}
+
+/// A silhouette against that of the next frame of the mesh, two centimetres to the side.
+#[divan::bench(args = [1, 2, 4])]
+fn chamfer(bencher: Bencher, scale: usize) {
+    let Some(capture) = capture::frame_0("chamfer") else { return };
+    let topology = Topology::new(&capture.mesh.faces, capture.mesh.vertices.len());
+    let view = View::reduced(&capture.cameras[0], scale);
+    let moved: Vec<_> = capture.mesh.vertices.iter().map(|v| v + Vector3::new(0.02, 0.0, 0.0)).collect();
+    let mut drawn = Silhouette::empty(1, 1);
+    let bounds = Rasteriser::new().silhouette(&view, &moved, &topology, &mut drawn);
+    let observed = Observed::new(reduced(&capture.silhouettes[0], scale));
+    let mut chamfer = Chamfer::new();
+    bencher.bench_local(|| chamfer.difference(&drawn, bounds, &observed));
 }

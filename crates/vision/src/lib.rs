@@ -3,6 +3,7 @@
 //! - [`View`], [`Topology`], [`Rasteriser`], [`DepthBuffer`]: meshes drawn through cameras.
 //! - [`contours`], [`DistanceField`]: outlines of silhouettes, and how far from them everything is.
 //! - [`find_rim`]: the points of a mesh that make its outline.
+//! - [`Chamfer`], [`overlap_in`]: how much two silhouettes differ.
 //!
 //! Metres and y up in the world; pixels in images, (0, 0) is the centre of the top-left one (`docs/vision.md`).
 //!
@@ -23,9 +24,10 @@
 //! let mut silhouette = Silhouette::empty(100, 100);
 //! let view = vision::View::new(&camera);
 //! let bounds = vision::Rasteriser::new().silhouette(&view, &vertices, &topology, &mut silhouette);
-//! assert_eq!(bounds, Some([50, 50, 75, 75]));
+//! assert_eq!(bounds, Some([50, 50, 74, 74]));
 //! ```
 
+mod chamfer;
 mod contour;
 mod depth;
 mod distance;
@@ -34,6 +36,7 @@ mod rim;
 mod topology;
 mod view;
 
+pub use chamfer::{Chamfer, Difference, Observed, overlap_in};
 pub use contour::{Contour, ContourOptions, ContourPoint, contours};
 pub use depth::DepthBuffer;
 pub use distance::{DistanceField, reduced};

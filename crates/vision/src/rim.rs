@@ -16,7 +16,8 @@ pub struct RimPoint {
     pub pixel: Vector2<f64>,
     /// away from the mesh in the image, unit vector at a right angle to the edge
     pub image_normal: Vector2<f64>,
-    /// length of the edge in the image, pixels of the view: how much of the outline the point stands for
+    /// length of the edge in the image, pixels of the view: how much of the outline the point stands for (a rim
+    /// that zigzags is longer than the outline)
     pub length: f64,
 }
 

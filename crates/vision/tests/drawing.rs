@@ -112,7 +112,8 @@ fn the_rim_lies_on_the_outline_and_looks_out() {
         let outlines = contours(silhouette, &ContourOptions::default());
         let total: f64 = outlines.iter().map(|outline| outline.length).sum();
         let covered: f64 = rim.iter().map(|point| point.length).sum();
-        println!("{}: {covered} of {total} pixels, {} points", camera.name, rim.len());
+        // edges zigzag and fingers are smoothed away, so that there is more of the rim
+        assert!((0.9..1.5).contains(&(covered / total)), "{}: {covered} of {total} pixels", camera.name);
         let mut misses: Vec<f64> = rim.iter().map(|point| field.sample(point.pixel).abs()).collect();
         misses.sort_by(f64::total_cmp);
         assert!(
