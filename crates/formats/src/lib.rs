@@ -1,4 +1,4 @@
-//! Motion file formats: bytes to model and back.
+//! File formats of motion, markers, cameras, meshes and pictures: bytes to model and back.
 //!
 //! Every reader takes bytes and gives a [`Read`]: the value, in metres, seconds and radians with y up, and the
 //! warnings about what was sloppy in the file. What can't be read is an [`Error`] that says where (line or byte
@@ -17,11 +17,17 @@ pub mod archive;
 pub mod asf;
 pub mod bvh;
 pub mod c3d;
+pub mod calibration;
 mod error;
 mod euler;
 mod frame_rate;
+pub mod glb;
+pub mod image_files;
 pub mod motion_csv;
 pub mod motion_files;
+pub mod npy;
+pub mod obj;
+pub mod ply;
 mod points;
 pub mod points_csv;
 mod read;

@@ -27,6 +27,11 @@ impl<'a> Lines<'a> {
         self.number
     }
 
+    /// What follows the line read last.
+    pub(crate) fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
     /// The next line with the blanks around it.
     pub(crate) fn next_untrimmed(&mut self) -> Option<Line<'a>> {
         if self.rest.is_empty() {
