@@ -185,7 +185,7 @@ pub(crate) fn first_at_or_after(x: f32) -> i32 {
 }
 
 /// Sets pixels `left..right` of a row of words.
-fn set_span(row: &mut [u64], left: usize, right: usize) {
+pub(crate) fn set_span(row: &mut [u64], left: usize, right: usize) {
     let (first, last) = (left / 64, (right - 1) / 64);
     let from = !0u64 << (left % 64);
     let to = !0u64 >> (63 - (right - 1) % 64);

@@ -6,6 +6,7 @@ use model::{Camera, Distortion, Mesh, Silhouette};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use serde_json::Value;
 
+#[allow(dead_code, reason = "not every test needs all of it")]
 pub struct Capture {
     pub cameras: Vec<Camera>,
     pub silhouettes: Vec<Silhouette>,
