@@ -82,7 +82,7 @@ impl Distortion {
             }
             let [[a, b], [c, d]] = self.jacobian(ideal);
             let determinant = a * d - b * c;
-            if !(determinant > 1e-6) {
+            if determinant.is_nan() || determinant <= 1e-6 {
                 return None;
             }
             ideal -= Vector2::new(d * miss.x - b * miss.y, a * miss.y - c * miss.x) / determinant;
