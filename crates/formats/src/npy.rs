@@ -22,7 +22,7 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 /// If the header is not as the format wants it, the numbers are of another kind (complex, text, objects), or there is not
 /// exactly the data that the shape needs.
 pub fn read(bytes: &[u8]) -> Result<Array> {
-    let Some([major, _]) = bytes.strip_prefix(MAGIC).and_then(|rest| rest.get(..2)) else {
+    let Some([major, _minor]) = bytes.strip_prefix(MAGIC).and_then(|rest| rest.get(..2)) else {
         let found = quote(&bytes[..bytes.len().min(8)]);
         return Err(at_byte(0, found, "the beginning of an NPY"));
     };
@@ -57,7 +57,7 @@ pub fn read(bytes: &[u8]) -> Result<Array> {
         let expected = format!("those of an array of {shape:?} numbers of {} bytes", kind.bytes);
         return Err(at_byte(end as u64, found, expected));
     }
-    let values: Vec<_> = bytes[end..].chunks_exact(kind.bytes).map(|number| kind.number(number)).collect();
+    let values = kind.numbers(&bytes[end..]);
     let values = if is_fortran { from_fortran(&shape, &values) } else { values };
     Ok(Array { shape, values })
 }
@@ -115,25 +115,34 @@ impl Kind {
         (is_known && is_order).then_some(Self { is_big_endian: *order == b'>', letter: *letter, bytes })
     }
 
-    fn number(self, bytes: &[u8]) -> f64 {
-        let mut little = [0; 8];
-        little[..bytes.len()].copy_from_slice(bytes);
-        if self.is_big_endian {
-            little[..bytes.len()].reverse();
-        }
-        let [a, b, c, d, ..] = little;
+    fn numbers(self, bytes: &[u8]) -> Vec<f64> {
+        let is_big = self.is_big_endian;
         match (self.letter, self.bytes) {
-            (b'f', 2) => half(u16::from_le_bytes([a, b])),
-            (b'f', 4) => f64::from(f32::from_le_bytes([a, b, c, d])),
-            (b'f', _) => f64::from_le_bytes(little),
-            (b'i', width) => {
-                // the sign is brought to the top and back
-                let unused = 64 - 8 * width as u32;
-                ((i64::from_le_bytes(little) << unused) >> unused) as f64
-            }
-            _ => u64::from_le_bytes(little) as f64,
+            (b'f', 2) => each(bytes, is_big, |number| half(u16::from_le_bytes(number))),
+            (b'f', 4) => each(bytes, is_big, |number| f64::from(f32::from_le_bytes(number))),
+            (b'f', _) => each(bytes, is_big, f64::from_le_bytes),
+            (b'i', 1) => each(bytes, is_big, |number| f64::from(i8::from_le_bytes(number))),
+            (b'i', 2) => each(bytes, is_big, |number| f64::from(i16::from_le_bytes(number))),
+            (b'i', 4) => each(bytes, is_big, |number| f64::from(i32::from_le_bytes(number))),
+            (b'i', _) => each(bytes, is_big, |number| i64::from_le_bytes(number) as f64),
+            (_, 1) => each(bytes, is_big, |number: [u8; 1]| f64::from(number[0])),
+            (_, 2) => each(bytes, is_big, |number| f64::from(u16::from_le_bytes(number))),
+            (_, 4) => each(bytes, is_big, |number| f64::from(u32::from_le_bytes(number))),
+            _ => each(bytes, is_big, |number| u64::from_le_bytes(number) as f64),
         }
     }
+}
+
+/// Every `N` bytes as a number.
+fn each<const N: usize>(bytes: &[u8], is_big_endian: bool, number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+    let little = |found: &[u8; N]| {
+        let mut little = *found;
+        if is_big_endian {
+            little.reverse();
+        }
+        number(little)
+    };
+    bytes.as_chunks().0.iter().map(little).collect()
 }
 
 /// A float of 16 bits: sign, 5 of exponent, 10 of fraction.

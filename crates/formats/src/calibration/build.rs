@@ -56,7 +56,7 @@ fn rotation(file: &FileCamera) -> Result<Rotation3<f64>> {
         Err(unexpected(file.place, format!("camera {}: {found}", file.name), expected))
     };
     let miss = (matrix * matrix.transpose() - Matrix3::identity()).amax();
-    if !(miss <= ORTHONORMAL) {
+    if miss.is_nan() || miss > ORTHONORMAL {
         return fail(
             format!("a rotation whose rows are not orthonormal (off by {miss:.3})"),
             "a rotation matrix or a rotation vector",

@@ -30,6 +30,11 @@ pub(super) fn read(text: &str, warnings: &mut Warnings) -> Result<FileCameras> {
         .filter(|node| node.has_tag_name("camera"));
     let mut found = Vec::new();
     for (index, node) in cameras.enumerate() {
+        if node.attribute("active") == Some("0") {
+            let serial = node.attribute("serial").unwrap_or_default();
+            warnings.add(place(node), format!("camera {serial:.40}: left out, as it was not active"));
+            continue;
+        }
         found.push(camera(index, node, warnings)?);
     }
     Ok(FileCameras { cameras: found, up: Stated::Certain(UpAxis::Z), metres: Some(1e-3) })

@@ -64,10 +64,15 @@ impl Buffer {
         accessor
     }
 
-    /// Vectors of which the range is not needed: normals, places of the root.
-    pub(super) fn vectors(&mut self, vectors: impl ExactSizeIterator<Item = Vector3<f64>>) -> usize {
-        let count = vectors.len();
-        self.push(("VEC3", F32), count, None, vectors.flat_map(|vector| words(&vector)))
+    /// Normals of the vertices.
+    pub(super) fn normals(&mut self, normals: impl ExactSizeIterator<Item = Vector3<f64>>) -> usize {
+        let count = normals.len();
+        self.push(("VEC3", F32), count, ATTRIBUTES, normals.flat_map(|normal| words(&normal)))
+    }
+
+    /// Places of the root.
+    pub(super) fn places(&mut self, places: &[Vector3<f64>]) -> usize {
+        self.push(("VEC3", F32), places.len(), None, places.iter().flat_map(words))
     }
 
     pub(super) fn indices(&mut self, indices: &[u32]) -> usize {

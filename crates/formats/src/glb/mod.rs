@@ -98,7 +98,7 @@ fn primitive(buffer: &mut Buffer, mesh: &Mesh, normals: &[Vector3<f64>]) -> Resu
     // vertices without faces have no normal, and the format wants one
     let unit = |normal: &Vector3<f64>| normal.try_normalize(1e-12).unwrap_or_else(Vector3::y);
     let position = buffer.positions(&mesh.vertices);
-    let normal = buffer.vectors(normals.iter().map(unit));
+    let normal = buffer.normals(normals.iter().map(unit));
     let indices = buffer.indices(mesh.faces.as_flattened());
     Ok(json!({ "attributes": { "POSITION": position, "NORMAL": normal }, "indices": indices, "material": 0 }))
 }

@@ -88,7 +88,7 @@ pub(super) fn animation(buffer: &mut Buffer, joints: usize, animation: &Animatio
         ));
     }
     let input = buffer.times(&in_single);
-    let place = buffer.vectors(translations.iter().copied());
+    let place = buffer.places(translations);
     let mut samplers = vec![json!({ "input": input, "output": place, "interpolation": "LINEAR" })];
     let mut channels = vec![json!({ "sampler": 0, "target": { "node": 1, "path": "translation" } })];
     for joint in 0..joints {
