@@ -13,9 +13,17 @@
 //! ```
 
 mod error;
+mod file;
+mod heat;
 mod jacobian;
+mod learn;
 mod limb;
+mod measure;
+mod motion;
+mod population;
 mod pose;
+mod procrustes;
+mod registered;
 mod regressor;
 mod rig;
 mod rig_json;
@@ -23,9 +31,15 @@ mod shape;
 mod skin;
 
 pub use error::Error;
+pub use file::MAX_BYTES;
+pub use heat::heat_skin;
 pub use jacobian::ShapeDrift;
+pub use learn::{Aligned, Alignment, LearnOptions, Learned, Scan, Template, learn, unpose};
 pub use limb::Limb;
+pub use measure::{DENSITY_KG_M3, Measurements};
+pub use population::{Sex, Subject, Wanted};
 pub use pose::Posed;
+pub use registered::{RegisteredFit, RegisteredOptions, fit_registered};
 pub use regressor::JointRegressor;
 pub use rig::{Dof, DofKind, ROOT_DOFS, Rig, RigJoint};
 pub use rig_json::RigFile;

@@ -1,5 +1,7 @@
+use model::Mesh;
 use nalgebra::Vector3;
 
+use crate::population::Population;
 use crate::{Error, JointRegressor, Limb, Result, Rig, Skin};
 
 /// Most principal components of a model.
@@ -47,6 +49,8 @@ pub struct BodyModel {
     /// displacements of the joints for one standard deviation, metres, shape `[components, joints]`
     pub(crate) joint_components: Vec<Vec<Vector3<f64>>>,
     limbs: Vec<Limb>,
+    /// how measurements and shape go together among the people it was learned from
+    pub(crate) population: Population,
 }
 
 /// One principal component, in 16 bits a number.
@@ -157,6 +161,7 @@ impl BodyModel {
             joint_mean,
             joint_components,
             limbs,
+            population: Population::default(),
         })
     }
 
@@ -273,4 +278,11 @@ pub struct Shape {
     pub vertices: Vec<Vector3<f64>>,
     /// metres, shape `[joints]`
     pub joints: Vec<Vector3<f64>>,
+}
+
+impl Shape {
+    /// The body at rest as a mesh.
+    pub fn mesh(&self, model: &BodyModel) -> Mesh {
+        Mesh { vertices: self.vertices.clone(), faces: model.faces.clone() }
+    }
 }

@@ -52,6 +52,25 @@ impl Skin {
         Ok(skin)
     }
 
+    /// From joints and weights in 65535ths as a file has them.
+    pub(crate) fn from_parts(
+        joints: &[[u8; INFLUENCES]],
+        weights: &[[u16; INFLUENCES]],
+        num_joints: usize,
+    ) -> Result<Self> {
+        for (vertex, (joints, weights)) in joints.iter().zip(weights).enumerate() {
+            let fail = |what: String| Err(Error::Skin { what: format!("vertex {vertex} {what}") });
+            let sum: u32 = weights.iter().map(|&weight| u32::from(weight)).sum();
+            if sum != u32::from(WHOLE) || !weights.is_sorted_by(|a, b| a >= b) {
+                return fail(format!("has weights {weights:?}, expected falling ones that sum to {WHOLE}"));
+            }
+            if let Some(joint) = joints.iter().find(|joint| usize::from(**joint) >= num_joints) {
+                return fail(format!("follows joint {joint}, expected indices below {num_joints}"));
+            }
+        }
+        Ok(Self { joints: joints.to_vec(), weights: weights.to_vec() })
+    }
+
     /// Number of vertices.
     pub fn num_vertices(&self) -> usize {
         self.joints.len()

@@ -8,7 +8,7 @@ use nalgebra::{Matrix4, Rotation3, Unit, Vector3};
 use scans::Scans;
 
 fn model(test: &str) -> Option<BodyModel> {
-    let bodies = testdata::shared("bodies", test)?;
+    let bodies = testdata::shared("data/bodies", test)?;
     Some(Scans::read(&bodies).model_of(0, &[1, 5, 9]))
 }
 

@@ -1,8 +1,9 @@
 //! The registered scans of the shared data, for tests and the command that learns the shipped model.
+#![allow(dead_code, reason = "each test uses some of it")]
 
 use std::{fs, path::Path};
 
-use body::{BodyModel, JointRegressor, ModelParts, Rig, RigFile, Skin};
+use body::{BodyModel, ModelParts, RigFile, Scan, Sex, Skin, Subject, Template};
 use nalgebra::Vector3;
 
 /// Numbers of an NPY file: what follows its header, in pieces of `N` bytes.
@@ -12,14 +13,15 @@ fn numbers<const N: usize>(path: &Path) -> Vec<[u8; N]> {
     bytes[10 + header..].as_chunks::<N>().0.to_vec()
 }
 
-/// Scans, their topology and the rig of `bodies` in the shared data.
+/// Scans, what is known of the people, and the template of `bodies` in the shared data.
 pub struct Scans {
-    pub faces: Vec<[u32; 3]>,
-    pub rig: Rig,
-    pub regressor: JointRegressor,
-    pub skin: Skin,
+    pub template: Template,
     /// metres, shape `[scans][vertices]`
     pub scans: Vec<Vec<Vector3<f64>>>,
+    /// subject and pose of every scan, as in `scans.csv`
+    pub names: Vec<[String; 2]>,
+    /// of the scans in the base pose, which come first
+    pub subjects: Vec<Subject>,
 }
 
 impl Scans {
@@ -32,19 +34,39 @@ impl Scans {
             .collect();
         let points: Vec<_> = steps.as_chunks::<3>().0.iter().map(|&p| Vector3::from(p)).collect();
         let joints = numbers::<4>(&bodies.join("rig/skin_joints.npy"));
-        let weights: Vec<f32> =
-            numbers::<4>(&bodies.join("rig/skin_weights.npy")).into_iter().map(f32::from_le_bytes).collect();
-        let text = fs::read(bodies.join("rig/rig.json")).unwrap();
-        let file = RigFile::parse(&text).unwrap();
+        let weights = floats(&bodies.join("rig/skin_weights.npy"));
+        let file = RigFile::parse(&fs::read(bodies.join("rig/rig.json")).unwrap()).unwrap();
         let rig = file.rig().unwrap();
-        let num_vertices = joints.len();
+        let scans: Vec<Vec<_>> = points.chunks_exact(joints.len()).map(<[_]>::to_vec).collect();
+        let subjects = rows(&bodies.join("scans/subjects.csv")).into_iter().map(|row| Subject {
+            sex: Some(if row[1] == "male" { Sex::Male } else { Sex::Female }),
+            age_years: row[2].parse().ok(),
+        });
+        let names =
+            rows(&bodies.join("scans/scans.csv")).into_iter().map(|row| [row[1].clone(), row[2].clone()]);
         Self {
-            faces: faces.as_chunks::<3>().0.to_vec(),
-            regressor: file.regressor(num_vertices).unwrap().unwrap(),
-            skin: Skin::new(&joints, weights.as_chunks::<4>().0, rig.num_joints()).unwrap(),
-            rig,
-            scans: points.chunks_exact(num_vertices).map(<[_]>::to_vec).collect(),
+            subjects: subjects.collect(),
+            names: names.collect(),
+            template: Template {
+                faces: faces.as_chunks::<3>().0.to_vec(),
+                rest: mean(&scans[..114]),
+                regressor: file.regressor(joints.len()).unwrap().unwrap(),
+                skin: Skin::new(&joints, weights.as_chunks::<4>().0, rig.num_joints()).unwrap(),
+                rig,
+            },
+            scans,
         }
+    }
+
+    /// The scans in the base pose.
+    pub fn base(&self) -> Vec<Scan<'_>> {
+        let scan = |(i, &subject): (usize, &Subject)| Scan {
+            name: &self.names[i][0],
+            vertices: &self.scans[i],
+            faces: None,
+            subject,
+        };
+        self.subjects.iter().enumerate().map(scan).collect()
     }
 
     /// A model whose mean is one scan and whose components lead from it to others.
@@ -54,14 +76,31 @@ impl Scans {
         };
         BodyModel::new(ModelParts {
             description: "differences of scans".into(),
-            faces: self.faces.clone(),
+            faces: self.template.faces.clone(),
             mean: self.scans[mean].clone(),
             components: others.iter().map(difference).collect(),
             variance_kept: vec![0.0; others.len()],
-            rig: self.rig.clone(),
-            regressor: self.regressor.clone(),
-            skin: self.skin.clone(),
+            rig: self.template.rig.clone(),
+            regressor: self.template.regressor.clone(),
+            skin: self.template.skin.clone(),
         })
         .unwrap()
     }
+}
+
+fn mean(scans: &[Vec<Vector3<f64>>]) -> Vec<Vector3<f64>> {
+    let mut sum = vec![Vector3::zeros(); scans[0].len()];
+    scans.iter().for_each(|scan| sum.iter_mut().zip(scan).for_each(|(sum, v)| *sum += v));
+    sum.into_iter().map(|v| v / scans.len() as f64).collect()
+}
+
+/// Numbers of an NPY file in single precision.
+pub fn floats(path: &Path) -> Vec<f32> {
+    numbers::<4>(path).into_iter().map(f32::from_le_bytes).collect()
+}
+
+/// Cells of a CSV file, without the first row.
+fn rows(path: &Path) -> Vec<Vec<String>> {
+    let text = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    text.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }

@@ -1,0 +1,141 @@
+//! Whether scans are what they should be: faults of files that would spoil a model without a word.
+
+use std::collections::HashMap;
+
+use nalgebra::Vector3;
+
+use crate::procrustes::{Rigid, rigid};
+use crate::{Error, Scan, Template};
+
+/// Heights of people who stand, metres.
+const HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.8..=2.6;
+/// Mean distance from the template, after turning and scaling, beyond which vertices must be in another order, metres.
+const MOST_APART_M: f64 = 0.15;
+
+/// Checks that the template's mesh is closed, looks outwards and fits its skin.
+pub fn check_template(template: &Template) -> crate::Result<()> {
+    let fail = |what: String| Err(Error::Template { what });
+    let mesh = model::Mesh::new(template.rest.clone(), template.faces.clone())
+        .map_err(|e| Error::Template { what: e.to_string() })?;
+    let open = open_edges(&template.faces);
+    if open > 0 {
+        return fail(format!("mesh has {open} open edges, expected a closed mesh"));
+    }
+    if !(mesh.volume() > 0.0) {
+        return fail("faces look inwards, expected corners counter-clockwise seen from outside".into());
+    }
+    if template.skin.num_vertices() != template.rest.len() {
+        let (found, expected) = (template.skin.num_vertices(), template.rest.len());
+        return fail(format!("skin has {found} vertices, the mesh {expected}"));
+    }
+    check_size(&template.rest).or_else(|what| fail(what))
+}
+
+/// Checks one scan against the template.
+pub fn check_scan(scan: &Scan<'_>, template: &Template) -> crate::Result<()> {
+    let result = check_topology(scan, template)
+        .and_then(|()| check_axes(scan.vertices, &template.rest))
+        .and_then(|()| check_size(scan.vertices));
+    result.map_err(|what| Error::Scan { name: scan.name.to_owned(), what })
+}
+
+fn check_topology(scan: &Scan<'_>, template: &Template) -> Result<(), String> {
+    let (found, expected) = (scan.vertices.len(), template.rest.len());
+    if found != expected {
+        return Err(format!("{found} vertices, expected the template's {expected}"));
+    }
+    if let Some(vertex) = scan.vertices.iter().position(|v| v.iter().any(|x| !x.is_finite())) {
+        return Err(format!("vertex {vertex} is not finite"));
+    }
+    let Some(faces) = scan.faces else { return Ok(()) };
+    if let Some(face) = faces.iter().find(|face| face.iter().any(|&corner| corner as usize >= expected)) {
+        return Err(format!("a face has corners {face:?}, expected indices below {expected}"));
+    }
+    let open = open_edges(faces);
+    if open > 0 {
+        return Err(format!("the mesh has holes: {open} open edges, expected a closed mesh"));
+    }
+    let canonical = |faces: &[[u32; 3]]| {
+        let mut faces: Vec<_> = faces.iter().map(|&face| first_smallest(face)).collect();
+        faces.sort_unstable();
+        faces
+    };
+    if canonical(faces) == canonical(&template.faces) {
+        return Ok(());
+    }
+    let turned: Vec<_> = faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    if canonical(&turned) == canonical(&template.faces) {
+        return Err("faces look inwards, expected corners counter-clockwise seen from outside".into());
+    }
+    Err(format!("{} faces that are not the template's {}", faces.len(), template.faces.len()))
+}
+
+/// Axes, from the similarity that brings the template to the scan: registered vertices tell every turn and mirroring.
+fn check_axes(scan: &[Vector3<f64>], template: &[Vector3<f64>]) -> Result<(), String> {
+    let Rigid { rotation, is_mirrored, scale, .. } = rigid(template.iter().zip(scan));
+    if !(scale > 0.0) {
+        return Err("all vertices are in one place".into());
+    }
+    if is_mirrored {
+        return Err(
+            "the body is mirrored: an axis is flipped, expected x to its left, y up, z to its front".into()
+        );
+    }
+    let up = rotation * Vector3::y();
+    if up.y < -0.7 {
+        return Err("the body stands upside down, expected y up".into());
+    }
+    if up.y < 0.7 {
+        let axis = if up.z.abs() > up.x.abs() { 'z' } else { 'x' };
+        return Err(format!("the body stands along the {axis} axis, expected y up"));
+    }
+    let moved = rigid(template.iter().zip(scan));
+    let apart = |(t, s): (&Vector3<f64>, &Vector3<f64>)| ((moved.apply(t) - s) / scale).norm();
+    let mean = template.iter().zip(scan).map(apart).sum::<f64>() / scan.len() as f64;
+    if mean > MOST_APART_M {
+        return Err(format!(
+            "vertices are {:.0} mm from the template's on average: another order of vertices, or not the base pose",
+            mean * 1000.0
+        ));
+    }
+    Ok(())
+}
+
+fn check_size(vertices: &[Vector3<f64>]) -> Result<(), String> {
+    let [low, high] = super::pca::ends(vertices).map(|vertex| vertices[vertex].y);
+    let height = high - low;
+    if HEIGHTS_M.contains(&height) {
+        return Ok(());
+    }
+    let unit = [("millimetres", 1e-3), ("centimetres", 0.01), ("inches", 0.0254)]
+        .iter()
+        .find(|(_, metres)| HEIGHTS_M.contains(&(height * metres)))
+        .map_or(String::new(), |(unit, _)| format!(" (is the file in {unit}?)"));
+    Err(format!(
+        "the body is {height:.3} m tall, expected {} to {} m{unit}",
+        HEIGHTS_M.start(),
+        HEIGHTS_M.end()
+    ))
+}
+
+/// Edges that have not one face on either side.
+fn open_edges(faces: &[[u32; 3]]) -> usize {
+    let mut edges: HashMap<[u32; 2], [u32; 2]> = HashMap::new();
+    for &[a, b, c] in faces {
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            let counts = edges.entry([from.min(to), from.max(to)]).or_default();
+            counts[usize::from(from > to)] += 1;
+        }
+    }
+    edges.values().filter(|&&counts| counts != [1, 1]).count()
+}
+
+fn first_smallest([a, b, c]: [u32; 3]) -> [u32; 3] {
+    if a <= b && a <= c {
+        [a, b, c]
+    } else if b <= c {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    }
+}
