@@ -11,20 +11,25 @@ use super::{
 ///
 /// The hull of silhouettes that fit together fills every one of them. A view that lost a limb, or whose calibration is wrong,
 /// carves away what the other views' silhouettes show. So the hull is carved coarsely (cells of 2 cm), and each view is asked
-/// how much more of the other silhouettes would be filled without it: the mean over the other views, as a share of their
-/// areas. The view with the largest such share disagrees if that is above 0.02. Where the cameras stand doesn't matter: a
-/// good view may carve much, but nothing that the others show in the end.
+/// how much more of any other silhouette would be filled without it, as a share of that silhouette's area. The view with the
+/// largest such share disagrees if that is above 0.02. Where the cameras stand doesn't matter: a
+/// good view may carve much, but nothing that the others show in the end. When a view is left out, the others are asked again
+/// without it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Agreement {
     /// volume that all other views keep and this one carves away, as a share of the largest hull of all views but one
     pub carved_alone: f64,
-    /// share of the other views' silhouettes that the hull fills without this view and doesn't with it
+    /// share of another view's silhouette that the hull fills without this view and doesn't with it, the largest of all
+    /// other views
     pub unexplained: f64,
+    /// share of its own silhouette that the coarse hull fills, with this view in it: near 1 if all views fit together. Where
+    /// it is low, this view or several others are wrong, or there is more than one person
+    pub filled: f64,
     /// it disagreed with the others and was not used
     pub is_left_out: bool,
 }
 
-/// Share of the others' silhouettes from which on a view disagrees: less than an arm.
+/// Share of another silhouette from which on a view disagrees: less than an arm.
 const DISAGREES: f64 = 0.02;
 
 /// Cells of the coarse carving, metres.
@@ -63,16 +68,14 @@ pub(super) fn carve_coarsely(cones: &[Cone], root: &Cube, options: &HullOptions)
     let kept = volume(&carving.kept);
     let alone: Vec<_> = carving.kept_by_others.iter().map(|cubes| volume(cubes)).collect();
     let largest = alone.iter().fold(1e-12, |most: f64, alone| most.max(kept + alone));
-    let unexplained = carving.unexplained();
-    let agreement: Vec<_> = alone
-        .iter()
-        .zip(&unexplained)
-        .map(|(alone, &unexplained)| Agreement {
-            carved_alone: alone / largest,
-            unexplained,
-            is_left_out: false,
-        })
-        .collect();
+    let (unexplained, filled) = carving.fill_silhouettes();
+    let agreement = |index: usize| Agreement {
+        carved_alone: alone[index] / largest,
+        unexplained: unexplained[index],
+        filled: filled[index],
+        is_left_out: false,
+    };
+    let agreement = (0..cones.len()).map(agreement).collect();
     let worst = (0..cones.len()).max_by(|&a, &b| unexplained[a].total_cmp(&unexplained[b]));
     let worst = worst.filter(|&worst| unexplained[worst] > DISAGREES);
     Coarse { agreement, worst, bounds: carving.bounds }
@@ -120,22 +123,27 @@ impl Carving<'_> {
         }
     }
 
-    /// Of every cone: how much more of the other silhouettes the hull would fill without it, mean of the shares.
-    fn unexplained(&self) -> Vec<f64> {
-        let mut sums = vec![0.0; self.cones.len()];
+    /// Of every cone: how much more of another silhouette the hull would fill without it, the largest share; and the share of
+    /// its own silhouette that the hull fills.
+    fn fill_silhouettes(&self) -> (Vec<f64>, Vec<f64>) {
+        let mut shares = vec![0.0f64; self.cones.len()];
+        let mut own = vec![0.0; self.cones.len()];
         for (index, cone) in self.cones.iter().enumerate() {
             let mut filled = Silhouette::empty(cone.small.width(), cone.small.height());
             self.kept.iter().for_each(|cube| cone.fill_small(cube, &mut filled));
+            let area = cone.small.area().max(1) as f64;
+            let words = cone.small.words().iter().zip(filled.words());
+            own[index] = f64::from(words.map(|(seen, with)| (seen & with).count_ones()).sum::<u32>()) / area;
             for (other, cubes) in self.kept_by_others.iter().enumerate().filter(|(other, _)| *other != index)
             {
                 let mut more = filled.clone();
                 cubes.iter().for_each(|cube| cone.fill_small(cube, &mut more));
                 let words = cone.small.words().iter().zip(filled.words().iter().zip(more.words()));
                 let gained: u32 = words.map(|(seen, (with, more))| (seen & more & !with).count_ones()).sum();
-                sums[other] += f64::from(gained) / cone.small.area().max(1) as f64;
+                let share = f64::from(gained) / area;
+                shares[other] = share.max(shares[other]);
             }
         }
-        let others = (self.cones.len() - 1) as f64;
-        sums.iter().map(|sum| sum / others).collect()
+        (shares, own)
     }
 }

@@ -36,7 +36,7 @@ pub(super) fn carve_finely(
     let last = (most / cell_m).map(|x| x.ceil() + 1.0);
     let points = last - first + Vector3::repeat(1.0);
     let cells = points.x * points.y * points.z;
-    if !(cells <= options.max_cells as f64) {
+    if cells > options.max_cells as f64 {
         return Err(Error::TooManyCells {
             size_m: (most - least).into(),
             cell_m,
