@@ -70,6 +70,20 @@ fn every_kind_of_archive_gives_the_same_files() {
 }
 
 #[test]
+fn only_the_files_that_are_wanted_are_unpacked() {
+    let files: [(&str, &[u8]); 3] = [("cam1/0.png", b"a"), ("cam2/0.png", b"b"), ("cam2/1.png", b"c")];
+    for bytes in [tar(&files), zip(&files), gzip(&tar(&files))] {
+        let mut seen = Vec::new();
+        let found = formats::archive::entries_where("a", &bytes, &Limits::default(), |name| {
+            seen.push(name.to_owned());
+            name.starts_with("cam2/")
+        });
+        assert_eq!(found.unwrap(), [entry("cam2/0.png", "b"), entry("cam2/1.png", "c")]);
+        assert_eq!(seen, ["cam1/0.png", "cam2/0.png", "cam2/1.png"]);
+    }
+}
+
+#[test]
 fn a_single_file_is_an_archive_of_one() {
     let limits = Limits::default();
     for (name, bytes) in

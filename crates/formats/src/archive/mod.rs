@@ -47,7 +47,21 @@ pub struct Entry {
 /// # Errors
 /// If the archive or a member is damaged, or exceeds the limits.
 pub fn entries(name: &str, bytes: &[u8], limits: &Limits) -> Result<Vec<Entry>> {
-    let mut unpacking = Unpacking::new(limits, bytes.len());
+    entries_where(name, bytes, limits, |_| true)
+}
+
+/// The files of an archive whose names `is_wanted` says yes to, as [`entries`] gives them; it is asked once for each, in
+/// their order, so that it can also list what there is. Others are passed over and take no memory.
+///
+/// # Errors
+/// As [`entries`]; members that aren't wanted are counted and not looked into.
+pub fn entries_where(
+    name: &str,
+    bytes: &[u8],
+    limits: &Limits,
+    mut is_wanted: impl FnMut(&str) -> bool,
+) -> Result<Vec<Entry>> {
+    let mut unpacking = Unpacking::new(limits, bytes.len(), &mut is_wanted);
     match Kind::of(bytes) {
         Kind::Zip => zip::read(bytes, &mut unpacking)?,
         Kind::Tar => {
@@ -62,12 +76,16 @@ pub fn entries(name: &str, bytes: &[u8], limits: &Limits) -> Result<Vec<Entry>> 
             read.map_err(|e| stream.error(compression.name(), &e))?;
             if tar::is_header(&head) {
                 tar::read(head.as_slice().chain(unpacked), &stream, &mut unpacking)?;
-            } else {
+            } else if unpacking.takes_next(name::without_compression(name).as_bytes())? {
                 unpacked.read_to_end(&mut head).map_err(|e| stream.error(compression.name(), &e))?;
-                unpacking.push(name::without_compression(name).as_bytes(), head)?;
+                unpacking.push(name::without_compression(name).as_bytes(), head);
             }
         }
-        Kind::Plain => unpacking.push(name.as_bytes(), bytes.to_vec())?,
+        Kind::Plain => {
+            if unpacking.takes_next(name.as_bytes())? {
+                unpacking.push(name.as_bytes(), bytes.to_vec());
+            }
+        }
     }
     Ok(unpacking.entries)
 }
@@ -94,18 +112,21 @@ impl Kind {
 }
 
 /// The entries so far, and how much more may come.
-struct Unpacking {
+struct Unpacking<'a> {
     limits: Limits,
     budget: Budget,
+    is_wanted: &'a mut dyn FnMut(&str) -> bool,
+    /// members that came, wanted or not
+    members: usize,
     entries: Vec<Entry>,
 }
 
-impl Unpacking {
-    fn new(limits: &Limits, packed_bytes: usize) -> Self {
+impl<'a> Unpacking<'a> {
+    fn new(limits: &Limits, packed_bytes: usize, is_wanted: &'a mut dyn FnMut(&str) -> bool) -> Self {
         const FREE: u64 = 16 << 20;
         let by_ratio = (packed_bytes as u64).saturating_mul(limits.ratio).saturating_add(FREE);
         let budget = Budget::new(limits.total_bytes.min(by_ratio));
-        Self { limits: *limits, budget, entries: Vec::new() }
+        Self { limits: *limits, budget, is_wanted, members: 0, entries: Vec::new() }
     }
 
     /// A budget of its own for the archive's stream, from which the members are then taken.
@@ -127,26 +148,26 @@ impl Unpacking {
             None => self.push(member, bytes),
             Some(compression) => {
                 let unpacked = self.read(compression.name(), member, compression.reader(&bytes))?;
-                self.push(name::without_compression(&String::from_utf8_lossy(member)).as_bytes(), unpacked)
+                self.push(name::without_compression(&String::from_utf8_lossy(member)).as_bytes(), unpacked);
             }
         }
-    }
-
-    fn push(&mut self, name: &[u8], bytes: Vec<u8>) -> Result<()> {
-        self.check_next(name)?;
-        self.entries.push(Entry { name: name::clean(name), bytes });
         Ok(())
     }
 
-    /// Refuses a member whose name is too long, and one more than there may be.
-    fn check_next(&self, name: &[u8]) -> Result<()> {
-        if self.entries.len() >= self.limits.entries {
+    fn push(&mut self, name: &[u8], bytes: Vec<u8>) {
+        self.entries.push(Entry { name: name::clean(name), bytes });
+    }
+
+    /// Whether the next member is to be read. Refuses one whose name is too long, and one more than there may be.
+    fn takes_next(&mut self, name: &[u8]) -> Result<bool> {
+        if self.members >= self.limits.entries {
             return Err(Error::Limit { what: "files", limit: self.limits.entries as u64 });
         }
+        self.members += 1;
         if name.len() > self.limits.name_bytes {
             let limit = Error::Limit { what: "bytes in a name", limit: self.limits.name_bytes as u64 };
             return Err(limit.in_file(name::shown(name)));
         }
-        Ok(())
+        Ok((self.is_wanted)(&name::clean(name)))
     }
 }

@@ -21,7 +21,7 @@ pub(super) fn is_header(bytes: &[u8]) -> bool {
 }
 
 /// Regular files only: folders, links and devices are skipped. `reader` is charged to `stream`.
-pub(super) fn read(reader: impl Read, stream: &Budget, unpacking: &mut Unpacking) -> Result<()> {
+pub(super) fn read(reader: impl Read, stream: &Budget, unpacking: &mut Unpacking<'_>) -> Result<()> {
     let mut archive = ::tar::Archive::new(reader);
     for entry in archive.entries().map_err(|e| stream.error(FORMAT, &e))? {
         let entry = entry.map_err(|e| stream.error(FORMAT, &e))?;
@@ -29,7 +29,9 @@ pub(super) fn read(reader: impl Read, stream: &Budget, unpacking: &mut Unpacking
             continue;
         }
         let name = entry.path_bytes().into_owned();
-        unpacking.check_next(&name)?;
+        if !unpacking.takes_next(&name)? {
+            continue;
+        }
         let size = entry.size();
         let read = unpacking.read(FORMAT, &name, entry);
         let bytes = read.map_err(|e| stream.exceeded().unwrap_or(e))?;

@@ -6,7 +6,7 @@ use crate::{Error, Result};
 const FORMAT: &str = "zip";
 
 /// Files only: folders and symbolic links are skipped.
-pub(super) fn read(bytes: &[u8], unpacking: &mut Unpacking) -> Result<()> {
+pub(super) fn read(bytes: &[u8], unpacking: &mut Unpacking<'_>) -> Result<()> {
     let damaged = |e: ::zip::result::ZipError| Error::Damaged { format: FORMAT, message: e.to_string() };
     let mut archive = ::zip::ZipArchive::new(Cursor::new(bytes)).map_err(damaged)?;
     for index in 0..archive.len() {
@@ -18,7 +18,9 @@ pub(super) fn read(bytes: &[u8], unpacking: &mut Unpacking) -> Result<()> {
             continue;
         }
         let name = member.name_raw().to_vec();
-        unpacking.check_next(&name)?;
+        if !unpacking.takes_next(&name)? {
+            continue;
+        }
         if member.encrypted() {
             let message = "the member is encrypted".into();
             return Err(Error::Damaged { format: FORMAT, message }.in_file(name::shown(&name)));
