@@ -11,12 +11,17 @@ use model::Silhouette;
 use crate::{
     CleaningParameters,
     classes::Classes,
-    components::{Components, Neighbours},
+    components::{Components, Neighbours, Region},
     morphology::Morphology,
 };
 
 /// Pieces larger than this share of the main region must have been the person before.
 const LARGEST_NEW_PIECE: f64 = 0.5;
+
+/// Share of a hole's pixels that are not plain background from which it may be the person.
+const DOUBTFUL: f64 = 0.6;
+/// Such holes are filled up to this share of the person's area.
+const LARGEST_DOUBTFUL_HOLE: f64 = 0.1;
 
 /// Makes silhouettes of one size; knows the last one.
 #[derive(Debug, Clone)]
@@ -85,7 +90,7 @@ impl Cleaner {
                 cleaned.other_area = cleaned.other_area.max(region.area);
             }
         }
-        cleaned.filled_area = self.fill_holes(person);
+        cleaned.filled_area = self.fill_holes(classes, person);
         cleaned.area = person.area();
         cleaned.bounds = person.bounds().unwrap_or_default();
         copy(person, &mut self.previous);
@@ -136,16 +141,23 @@ impl Cleaner {
         }
     }
 
-    /// Fills what is enclosed and small; what is between arm and body stays open.
-    fn fill_holes(&mut self, person: &mut Silhouette) -> usize {
+    /// Fills what is enclosed and small, or enclosed and not plain background: skin before a wall is easily taken for a
+    /// shadow. What is between arm and body stays open, where the background is seen.
+    fn fill_holes(&mut self, classes: &Classes, person: &mut Silhouette) -> usize {
         let (width, height) = (person.width(), person.height());
         self.holes.find(person, false, Neighbours::Four);
-        let largest = self.parameters.largest_hole * person.area() as f64;
+        self.shared.clear();
+        self.shared.resize(self.holes.regions().len(), 0);
+        for class in [&classes.foreground, &classes.shadow, &classes.highlight] {
+            self.holes.overlaps(class, |region, pixels| self.shared[region] += pixels);
+        }
+        let area = person.area() as f64;
         let is_hole = |region: usize| {
-            let region = &self.holes.regions()[region];
-            let [left, top, right, bottom] = region.bounds;
+            let Region { area: hole, bounds: [left, top, right, bottom] } = self.holes.regions()[region];
             let is_enclosed = left > 0 && top > 0 && right < width && bottom < height;
-            is_enclosed && region.area as f64 <= largest
+            let is_doubtful = self.shared[region] as f64 >= DOUBTFUL * hole as f64;
+            let limit = if is_doubtful { LARGEST_DOUBTFUL_HOLE } else { self.parameters.largest_hole };
+            is_enclosed && hole as f64 <= limit * area
         };
         self.holes.draw(person, true, is_hole);
         (0..self.holes.regions().len()).filter(|&i| is_hole(i)).map(|i| self.holes.regions()[i].area).sum()

@@ -51,17 +51,18 @@ type Sigma = [f32; 3];
 impl Distortion {
     /// Learns from the sample alone: medians and their absolute deviations.
     pub(crate) fn adaptive(parameters: &Parameters, frames: &[Image], sample: &Sample) -> Self {
-        let mut values = vec![0; frames.len()];
+        let mut values = vec![0.0; frames.len()];
         let floor = parameters.noise_floor as f32;
+        let gains = gains(parameters, &sample.median, frames);
         let sigma = |index: usize| {
             let mut sigma = [0.0; 3];
             for (c, sigma) in sigma.iter_mut().enumerate() {
-                let middle = sample.median.rgb()[3 * index + c];
-                for (value, frame) in values.iter_mut().zip(frames) {
-                    *value = frame.rgb()[3 * index + c].abs_diff(middle);
+                let middle = f32::from(sample.median.rgb()[3 * index + c]);
+                for ((value, frame), gain) in values.iter_mut().zip(frames).zip(&gains) {
+                    *value = (gain[c] * f32::from(frame.rgb()[3 * index + c]) - middle).abs();
                 }
-                let deviation = f32::from(*values.select_nth_unstable(frames.len() / 2).1);
-                let noise = sample.noise_at(f32::from(middle)).max(floor);
+                let deviation = *values.select_nth_unstable_by(frames.len() / 2, f32::total_cmp).1;
+                let noise = sample.noise_at(middle).max(floor);
                 *sigma = (deviation / NORMAL_MEDIAN).clamp(noise, LARGEST_SIGMA.max(noise));
             }
             sigma
@@ -121,17 +122,13 @@ impl Distortion {
             update_rate: parameters.update_rate as f32,
             gain: parameters.follow_gain.then(|| GainMeter::new(expected)),
         };
-        learned.learn_limits(frames, parameters.detection_rate);
+        learned.learn_limits(frames, &gains(parameters, expected, frames), parameters.detection_rate);
         learned
     }
 
     /// Spreads a and b of the distortions of each pixel, then the thresholds of all pixels together.
-    fn learn_limits(&mut self, frames: &[Image], detection_rate: f64) {
+    fn learn_limits(&mut self, frames: &[Image], gains: &[[f32; 3]], detection_rate: f64) {
         let count = self.width * self.height;
-        let gains: Vec<[f32; 3]> = frames
-            .iter()
-            .map(|frame| self.gain.as_mut().map_or([1.0; 3], |gain| gain.measure(frame)))
-            .collect();
         let (mut alphas, mut colours) = (vec![0.0; frames.len()], vec![0.0; frames.len()]);
         let (mut all_alphas, mut all_colours) = (Vec::new(), Vec::new());
         let mut spreads = Vec::with_capacity(count);
@@ -267,6 +264,15 @@ impl Distortion {
     }
 }
 
+/// Gains of the frames against a picture, or 1 if they are not to be followed.
+fn gains(parameters: &Parameters, expected: &Image, frames: &[Image]) -> Vec<[f32; 3]> {
+    if !parameters.follow_gain {
+        return vec![[1.0; 3]; frames.len()];
+    }
+    let mut meter = GainMeter::new(expected);
+    frames.iter().map(|frame| meter.measure(frame)).collect()
+}
+
 /// The value that a standard normal exceeds with this probability, below 0.5: Abramowitz and Stegun 26.2.23, within 0.0005.
 fn normal_tail(probability: f64) -> f64 {
     let t = (-2.0 * probability.ln()).sqrt();
@@ -286,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn half_the_light_is_a_shadow_and_another_colour_is_not() {
+    fn less_light_is_a_shadow_and_another_colour_is_not() {
         let mut background = Image::black(64, 32);
         background.rgb_mut().chunks_exact_mut(3).for_each(|pixel| pixel.copy_from_slice(&[120, 140, 100]));
         let parameters = Parameters { follow_gain: false, update_rate: 0.0, ..Parameters::default() };
@@ -294,10 +300,10 @@ mod tests {
         let sample = Sample::new(&frames).unwrap();
         let mut learned = Distortion::adaptive(&parameters, &frames, &sample);
         let mut frame = background;
-        frame.set(10, 5, [78, 91, 65]);
+        frame.set(10, 5, [90, 105, 75]);
         frame.set(11, 5, [140, 120, 100]);
         frame.set(12, 5, [24, 28, 20]);
-        frame.set(13, 5, [144, 168, 120]);
+        frame.set(13, 5, [138, 161, 115]);
         let mut classes = Classes::new(64, 32);
         learned.classify(&frame, &mut classes);
         assert!(classes.shadow.contains(10, 5) && classes.highlight.contains(13, 5));

@@ -43,6 +43,21 @@ impl Grey {
         Some(above * (1.0 - b) + below * b)
     }
 
+    /// Means of 3 × 3 pixels, twice; the border stays.
+    pub fn blurred(&self) -> Self {
+        let mut blurred = self.clone();
+        for _ in 0..2 {
+            let from = blurred.clone();
+            for y in 1..self.height.saturating_sub(1) {
+                for x in 1..self.width.saturating_sub(1) {
+                    let sum: i32 = (0..9).map(|i| from.get(x + i % 3 - 1, y + i / 3 - 1)).sum();
+                    blurred.values[y * self.width + x] = ((sum + 4) / 9) as u8;
+                }
+            }
+        }
+        blurred
+    }
+
     /// How steep brightness is, grey levels over two pixels; 0 at the border.
     pub fn slope(&self, x: usize, y: usize) -> i32 {
         if x == 0 || y == 0 || x + 1 >= self.width || y + 1 >= self.height {

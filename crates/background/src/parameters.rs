@@ -53,7 +53,8 @@ pub struct Parameters {
 pub struct MixtureParameters {
     /// squared distance from a mode, in variances, up to which a colour belongs to the background
     pub threshold: f64,
-    /// weight that the modes of the background have together
+    /// weight that the modes of the background have together; the rest is for the person, who may be at one spot for no
+    /// more than this is below 1
     pub background_weight: f64,
     /// variance of a new mode, grey levels squared
     pub first_variance: f64,
@@ -84,14 +85,14 @@ impl Default for Parameters {
         Self {
             model: ModelKind::Auto,
             sample_frames: 24,
-            detection_rate: 0.9999,
+            detection_rate: 0.999,
             noise_floor: 1.5,
-            darkest_shadow: 0.5,
-            brightest_highlight: 1.3,
+            darkest_shadow: 0.65,
+            brightest_highlight: 1.2,
             update_rate: 0.002,
             follow_gain: true,
             max_shift: 12,
-            edge_tolerance: 0.4,
+            edge_tolerance: 0.2,
             mixture: MixtureParameters::default(),
             cleaning: CleaningParameters::default(),
         }
@@ -100,7 +101,7 @@ impl Default for Parameters {
 
 impl Default for MixtureParameters {
     fn default() -> Self {
-        Self { threshold: 16.0, background_weight: 0.9, first_variance: 15.0 }
+        Self { threshold: 16.0, background_weight: 0.7, first_variance: 15.0 }
     }
 }
 
@@ -110,7 +111,7 @@ impl Default for CleaningParameters {
             opening: 1,
             closing: 3,
             largest_hole: 0.004,
-            join_distance: 0.012,
+            join_distance: 0.016,
             smallest_piece: 0.004,
             continuity: 0.2,
             smallest_person: 0.001,

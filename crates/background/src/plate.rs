@@ -9,8 +9,8 @@ use crate::{Error, Parameters, Result, grey::Grey};
 
 /// Difference of brightness beyond which it does not matter how large it is, grey levels.
 const CLIP: f32 = 30.0;
-/// Slope that makes a pixel worth looking at for the place, grey levels.
-const EDGE: i32 = 24;
+/// Share of the pixels, those with the steepest slopes, that are worth looking at for the place.
+const EDGE_SHARE: f64 = 0.1;
 /// Most pixels that decide on the place.
 const MOST_EDGES: usize = 12_000;
 /// Difference that remains after alignment where a pixel shows something else, grey levels.
@@ -63,7 +63,10 @@ impl AlignedPlate {
         if !similar(found_width, width) || !similar(found_height, height) {
             return Err(Error::PlateSize { found_width, found_height, width, height });
         }
-        let (grey, reference) = (Grey::new(plate), Grey::new(median));
+        let shrunk = shrunk(plate, [width, height]);
+        let plate = &shrunk;
+        // blurred, since a place between the pixels would else look better for its smoother noise
+        let (grey, reference) = (Grey::new(plate).blurred(), Grey::new(median).blurred());
         let edges = edges(&reference);
         let place = find_place(&grey, &reference, &edges, parameters.max_shift);
         let mut image = resampled(plate, median, place);
@@ -122,10 +125,19 @@ impl Place {
 
 /// Pixels with a slope, evenly from all that have one.
 fn edges(grey: &Grey) -> Vec<Edge> {
+    let mut counts = [0usize; 256];
+    (0..grey.height).for_each(|y| (0..grey.width).for_each(|x| counts[grey.slope(x, y) as usize] += 1));
+    let wanted = (EDGE_SHARE * (grey.width * grey.height) as f64) as usize;
+    let mut more = 0;
+    let steep = (1..256).rev().find(|&slope| {
+        more += counts[slope];
+        more >= wanted
+    });
+    let steep = steep.unwrap_or(1) as i32;
     let mut found = Vec::new();
     for y in 1..grey.height - 1 {
         for x in 1..grey.width - 1 {
-            if grey.slope(x, y) >= EDGE {
+            if grey.slope(x, y) >= steep {
                 found.push(Edge { x: x as f32, y: y as f32, value: grey.get(x, y) as f32 });
             }
         }
@@ -214,6 +226,29 @@ fn coarse_gain(plate: &Grey, reference: &Grey, place: Place) -> f32 {
     }
     let half = ratios.len() / 2;
     if ratios.is_empty() { 1.0 } else { *ratios.select_nth_unstable_by(half, f32::total_cmp).1 }
+}
+
+/// Means of square blocks, where the plate is at least twice as large: it is to be as smooth as the frames.
+fn shrunk(plate: &Image, [width, height]: [usize; 2]) -> Image {
+    // a little less than twice, for clips with black bars
+    let factor =
+        ((plate.width() as f64 / width as f64).min(plate.height() as f64 / height as f64) + 0.05) as usize;
+    if factor < 2 {
+        return plate.clone();
+    }
+    let mut image = Image::black(plate.width() / factor, plate.height() / factor);
+    for y in 0..image.height() {
+        for x in 0..image.width() {
+            let mut sums = [0u32; 3];
+            for (dx, dy) in (0..factor).flat_map(|dx| (0..factor).map(move |dy| (dx, dy))) {
+                let pixel = plate.pixel(factor * x + dx, factor * y + dy);
+                (0..3).for_each(|c| sums[c] += u32::from(pixel[c]));
+            }
+            let count = (factor * factor) as u32;
+            image.set(x, y, sums.map(|sum| ((sum + count / 2) / count) as u8));
+        }
+    }
+    image
 }
 
 fn resampled(plate: &Image, like: &Image, place: Place) -> Image {

@@ -294,7 +294,7 @@ impl Judge {
             (camera.plate_differing > 0.3, Advice::PlateDiffers, 0.8),
             (camera.person_share < 0.8, Advice::NobodyFound, 1.0),
             (camera.thin_share > 0.3, Advice::Hollow, 0.8),
-            (camera.foreign_edge_share > 0.3, Advice::ForeignEdges, 0.8),
+            (camera.foreign_edge_share > 0.35, Advice::ForeignEdges, 0.8),
             (camera.border_share > 0.1, Advice::LeavesPicture, 1.0),
             (sums.people > 0 && camera.height_share < 0.15, Advice::TooSmall, 0.9),
             (camera.several_share > 0.2, Advice::SeveralPeople, 0.9),

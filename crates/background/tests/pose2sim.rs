@@ -25,7 +25,9 @@ const BONES: [(usize, usize); 13] = [
     (17, 18),
 ];
 /// All is done at this share of the recorded size.
-const SCALE: f64 = 0.5;
+const SCALE: f64 = 0.4;
+/// Frames that are looked at.
+const EVERY: u32 = 3;
 
 struct Outcome {
     /// share of the bones' points within the silhouette, mean over frames
@@ -120,28 +122,16 @@ fn run(folder: &Path, camera: usize, kind: ModelKind) -> Outcome {
     if let Some(alignment) = segmenter.alignment() {
         println!("  {alignment:.4?}");
     }
-    let mut reader = FrameReader::open(&source, &options).unwrap();
+    let mut reader = FrameReader::open(&source, &ReadOptions { every: EVERY, ..options }).unwrap();
     let (mut coverage, mut beyond, mut compared) = (0.0, 0.0, 0.0);
     let mut number = 0;
     while reader.read(&mut frame).unwrap() {
-        let (person, _quality) = segmenter.segment(&frame).unwrap();
-        if std::env::var_os("DUMP").is_some() && number % 33 == 0 {
-            let mut image = frame.clone();
-            for (x, y) in (0..image.width()).flat_map(|x| (0..image.height()).map(move |y| (x, y))) {
-                if !person.contains(x as isize, y as isize) {
-                    let p = image.pixel(x, y).map(|v| v / 3);
-                    image.set(x, y, p);
-                }
-            }
-            let mut bytes = format!("P6\n{} {}\n255\n", image.width(), image.height()).into_bytes();
-            bytes.extend_from_slice(image.rgb());
-            fs::write(format!("/tmp/s4b/o_{kind:?}_{camera}_{number:03}.ppm"), bytes).unwrap();
-        }
-        if number % 5 == 0 {
+        let (person, _) = segmenter.segment(&frame).unwrap();
+        if number % 6 == 0 {
             let (covered, far) = compare(person, &joints(folder, camera, number));
             (coverage, beyond, compared) = (coverage + covered, beyond + far, compared + 1.0);
         }
-        number += 1;
+        number += EVERY as usize;
     }
     let outcome =
         Outcome { coverage: coverage / compared, beyond: beyond / compared, quality: segmenter.quality() };
@@ -156,8 +146,14 @@ fn run(folder: &Path, camera: usize, kind: ModelKind) -> Outcome {
 fn the_plates_cover_the_limbs_and_what_they_show_is_warned_of() {
     let test = "the_plates_cover_the_limbs_and_what_they_show_is_warned_of";
     let Some(folder) = testdata::shared(FOLDER, test) else { return };
-    for camera in 1..=4 {
-        let _ = run(&folder, camera, ModelKind::Plate);
+    // what the README of the data reports of plates that were aligned and gain matched: 81, 42, 80, 74 %
+    for (camera, covered, beyond) in [(1, 0.75, 0.03), (2, 0.7, 0.2), (3, 0.8, 0.03), (4, 0.85, 0.03)] {
+        let outcome = run(&folder, camera, ModelKind::Plate);
+        let Outcome { coverage, beyond: found_beyond, quality } = &outcome;
+        assert!(*coverage > covered && *found_beyond < beyond, "cam0{camera}: {coverage} {found_beyond}");
+        assert!(!quality.advice.contains(&Advice::PersonStays));
+        // there is someone in all four
+        assert!(quality.advice.contains(&Advice::PlateShowsSomeone), "cam0{camera}: {quality:?}");
     }
 }
 
@@ -165,9 +161,11 @@ fn the_plates_cover_the_limbs_and_what_they_show_is_warned_of() {
 fn a_background_learned_from_a_man_who_stays_is_warned_of() {
     let test = "a_background_learned_from_a_man_who_stays_is_warned_of";
     let Some(folder) = testdata::shared(FOLDER, test) else { return };
-    for camera in 1..=4 {
-        let outcome = run(&folder, camera, ModelKind::Adaptive);
-        assert!(outcome.quality.advice.contains(&Advice::PersonStays), "cam0{camera}: {:?}", outcome.quality);
+    for (camera, kind) in (1..=4).map(|camera| (camera, ModelKind::Adaptive)).chain([(3, ModelKind::Mixture)])
+    {
+        let Outcome { coverage, quality, .. } = run(&folder, camera, kind);
+        assert!(coverage < 0.6, "cam0{camera} {kind:?}: {coverage}");
+        assert!(quality.advice.contains(&Advice::PersonStays), "cam0{camera} {kind:?}: {quality:?}");
+        assert!(quality.score < 0.4, "cam0{camera} {kind:?}: {quality:?}");
     }
-    let _ = run(&folder, 1, ModelKind::Mixture);
 }
