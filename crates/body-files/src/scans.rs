@@ -136,13 +136,9 @@ impl ScanSet {
         [count(|s| s.sex.is_some()), count(|s| s.age_years.is_some())]
     }
 
-    /// Learns a model.
-    ///
-    /// # Errors
-    /// [`Error::Body`] names the first scan that is not what it should be.
-    pub fn learn(&self, options: &LearnOptions) -> Result<Learned> {
-        let scans: Vec<Scan<'_>> = self
-            .scans
+    /// The scans and what is known of their people.
+    pub fn scans(&self) -> Vec<Scan<'_>> {
+        self.scans
             .iter()
             .zip(&self.subjects)
             .map(|(scan, subject)| Scan {
@@ -151,8 +147,15 @@ impl ScanSet {
                 faces: scan.faces.as_deref(),
                 subject: *subject,
             })
-            .collect();
-        Ok(body::learn(&scans, &self.template, options)?)
+            .collect()
+    }
+
+    /// Learns a model.
+    ///
+    /// # Errors
+    /// [`Error::Body`] names the first scan that is not what it should be.
+    pub fn learn(&self, options: &LearnOptions) -> Result<Learned> {
+        Ok(body::learn(&self.scans(), &self.template, options)?)
     }
 }
 
