@@ -1,9 +1,10 @@
 //! File formats of motion, markers, cameras, meshes and pictures: bytes to model and back.
 //!
-//! Every reader takes bytes and gives a [`Read`]: the value, in metres, seconds and radians with y up, and the
-//! warnings about what was sloppy in the file. What can't be read is an [`Error`] that says where (line or byte
-//! offset), what was found and what was expected. Readers never panic and need memory in proportion to the
-//! bytes they are given, whatever the bytes claim. The dialects are described in `docs/formats.md`.
+//! Readers take bytes and give a [`Read`]: the value, in metres, seconds and radians with y up, and the warnings about
+//! what was sloppy in the file (only the value, where nothing can be). What can't be read is an [`Error`] that says
+//! where (line or byte offset), what was found and what was expected. Readers never panic and need memory in
+//! proportion to the bytes they are given, whatever the bytes claim; pictures, which are packed, have limits of their
+//! own. The dialects are described in `docs/formats.md`.
 //!
 //! ```
 //! let asf = b":units\n length 0.45\n angle deg\n:root\n order TX TY TZ RX RY RZ\n axis XYZ\n:bonedata\n:hierarchy\n";

@@ -60,19 +60,17 @@ fn vertex<'a>(line: Line<'_>, words: impl Iterator<Item = &'a [u8]>) -> Result<V
 fn push_face<'a>(line: Line<'_>, words: impl Iterator<Item = &'a [u8]>, mesh: &mut Mesh) -> Result<usize> {
     let vertices = mesh.vertices.len();
     let before = mesh.faces.len();
-    let (mut first, mut last) = (None, None);
-    for word in words {
-        let corner = corner(word, vertices).ok_or_else(|| {
+    let mut corners = words.map(|word| {
+        corner(word, vertices).ok_or_else(|| {
             let expected = format!("a vertex from 1 to {vertices}, or from -{vertices} to -1");
             Error::at_line(line.number, quote(word), expected)
-        })?;
-        match (first, last) {
-            (None, _) => first = Some(corner),
-            (Some(first), Some(last)) => mesh.faces.push([first, last, corner]),
-            _ => {}
-        }
-        if first != Some(corner) || last.is_some() {
-            last = Some(corner);
+        })
+    });
+    let (first, mut last) = (corners.next().transpose()?, corners.next().transpose()?);
+    for corner in corners {
+        let corner = corner?;
+        if let (Some(first), Some(last)) = (first, last.replace(corner)) {
+            mesh.faces.push([first, last, corner]);
         }
     }
     if mesh.faces.len() == before {

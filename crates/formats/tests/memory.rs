@@ -1,7 +1,7 @@
 //! Files that claim to be huge must not make the readers allocate for it. The only test of its process, so that the
 //! process's peak is the readers'.
 
-use formats::{BvhOptions, PointsOptions, amc, archive, asf, bvh, c3d, points_csv, trc};
+use formats::{BvhOptions, PointsOptions, amc, archive, asf, bvh, c3d, npy, ply, points_csv, trc};
 
 /// Peak memory of this process, bytes; 0 where the system doesn't tell.
 fn peak() -> u64 {
@@ -51,6 +51,12 @@ fn huge_claims_of_small_files_take_little_memory() {
     tar.set_size(8 << 30);
     tar.set_cksum();
     assert!(archive::entries("a", tar.as_bytes(), &archive::Limits::default()).is_err());
+
+    let ply = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty double x\nproperty double y\n\
+               property double z\nelement face 4000000000\nproperty list uint int vertex_indices\nend_header\n\0\0";
+    assert!(ply::read(ply.as_bytes()).is_err());
+    let npy = b"\x93NUMPY\x02\x00\x40\x00\x00\x00{'descr': '<f8', 'fortran_order': False, 'shape': (4000000000,), }";
+    assert!(npy::read(npy).is_err());
 
     let grown = peak().saturating_sub(before);
     assert!(grown < 64 << 20, "{grown} bytes");

@@ -192,9 +192,12 @@ fn arrays_that_claim_more_than_they_have_are_refused() {
     assert!(npy::read(b"PK").unwrap_err().to_string().starts_with("byte 0: found \"PK\""));
 }
 
+/// Reads a file and gives the number of things in it, 0 if it is refused.
+type Reader = fn(&[u8]) -> usize;
+
 #[test]
 fn damaged_meshes_and_arrays_are_read_or_refused() {
-    let seeds: [(Vec<u8>, fn(&[u8]) -> usize); 4] = [
+    let seeds: [(Vec<u8>, Reader); 4] = [
         (obj::write(&mesh()).into_bytes(), |b| obj::read(b).map_or(0, |read| read.value.vertices.len())),
         (ply::write(&mesh()), |b| ply::read(b).map_or(0, |read| read.value.vertices.len())),
         (TEXT_PLY.into(), |b| ply::read(b).map_or(0, |read| read.value.faces.len())),
