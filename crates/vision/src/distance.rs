@@ -29,9 +29,9 @@ impl DistanceField {
     /// Distances of a silhouette, computed on `scale` times fewer pixels along each side (see [`reduced`]).
     ///
     /// # Panics
-    /// If `scale` is 0 or the silhouette is wider or higher than 65,535 pixels.
+    /// If `scale` is 0 or the silhouette is wider or higher than 32,768 pixels.
     pub fn new(silhouette: &Silhouette, scale: usize) -> Self {
-        assert!(silhouette.width().max(silhouette.height()) < 1 << 16, "at most 65,535 pixels a side");
+        assert!(silhouette.width().max(silhouette.height()) <= 1 << 15, "at most 32,768 pixels a side");
         let small;
         let silhouette = if scale == 1 {
             silhouette
@@ -95,20 +95,19 @@ impl DistanceField {
                 continue;
             }
             let start = (top + y) * self.width + left;
-            let mut parabolas = envelope.parabolas.iter().peekable();
-            let Some(mut current) = parabolas.next() else { continue };
-            for x in 0..columns {
-                while let Some(next) = parabolas.next_if(|next| next.from <= x as i32) {
-                    current = next;
+            let ends = envelope.parabolas[1..].iter().map(|next| next.from as usize).chain([columns]);
+            for (parabola, end) in envelope.parabolas.iter().zip(ends) {
+                let site_x = parabola.x as usize;
+                let site = (left + site_x) as u32 | (top as u32 + u32::from(row[site_x])) << 16;
+                let part = start + parabola.from as usize..start + end;
+                let pixels = self.values[part.clone()].iter_mut().zip(&mut self.nearest[part]);
+                for (x, (value, nearest)) in (parabola.from..).zip(pixels) {
+                    let squared = x.abs_diff(parabola.x).pow(2) + parabola.height as u32;
+                    // the sites themselves belong to the other transform
+                    let is_site = squared == 0;
+                    *value = if is_site { *value } else { sign * ((squared as f32).sqrt() - 0.5) };
+                    *nearest = if is_site { *nearest } else { site };
                 }
-                if is_site(left + x, top + y) {
-                    continue;
-                }
-                let across = i64::from(x as i32 - current.x);
-                let squared = across * across + i64::from(current.height);
-                self.values[start + x] = sign * ((squared as f32).sqrt() - 0.5);
-                let site_y = top as u32 + u32::from(row[current.x as usize]);
-                self.nearest[start + x] = (left as u32 + current.x as u32) | site_y << 16;
             }
         }
     }
