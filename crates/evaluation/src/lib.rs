@@ -4,6 +4,7 @@
 //! - [`foot_slide`], [`Calibration`]: whether standing feet stand, and whether errors are as large as stated.
 //! - [`evaluate_sparse`]: trials reconstructed from their own control points, by [`Protocol`], in every case of a [`Sweep`]:
 //!   methods, windows, sizes of the database, noise, gaps.
+//! - [`shape_errors`]: how far a body found in silhouettes is from the true one; [`Distribution`] over many.
 //! - [`summarise`] into [`Row`]s, [`tables`] of them beside the papers' own, and HTML reports ([`report`]).
 
 mod body;
@@ -17,6 +18,7 @@ mod metrics;
 mod models;
 mod protocol;
 pub mod report;
+mod shape;
 mod sparse_protocol;
 mod subset;
 mod summary;
@@ -34,6 +36,7 @@ pub use feet::{ContactThresholds, FootPaths, FootSlide, foot_slide};
 pub use gap::{GapErrors, gap_errors};
 pub use metrics::{Comparison, Errors, JointErrors, compare, compare_in_detail};
 pub use protocol::{ControlSet, Protocol};
+pub use shape::{Body, Distribution, ShapeErrors, shape_errors};
 pub use sparse_protocol::{SparseEvaluation, TrialResult, evaluate_sparse};
 pub use subset::{first_clips, poses_at_60, shuffle_by_name};
 pub use summary::{ALL, GapSummary, Row, summarise};
