@@ -29,12 +29,14 @@ mod rig;
 mod rig_json;
 mod shape;
 mod skin;
+mod skinned;
+mod template;
 
 pub use error::Error;
 pub use file::MAX_BYTES;
 pub use heat::heat_skin;
 pub use jacobian::ShapeDrift;
-pub use learn::{Aligned, Alignment, LearnOptions, Learned, Scan, Template, learn, unpose};
+pub use learn::{Aligned, Alignment, LearnOptions, Learned, Scan, learn, unpose};
 pub use limb::Limb;
 pub use measure::{DENSITY_KG_M3, Measurements};
 pub use population::{Sex, Subject, Wanted};
@@ -45,6 +47,7 @@ pub use rig::{Dof, DofKind, ROOT_DOFS, Rig, RigJoint};
 pub use rig_json::RigFile;
 pub use shape::{BodyModel, MAX_COMPONENTS, MAX_VERTICES, ModelParts, Shape};
 pub use skin::Skin;
+pub use template::{Template, TemplateParts};
 
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

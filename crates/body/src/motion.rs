@@ -60,14 +60,10 @@ impl BodyModel {
         for pose in poses {
             shape.pose_joints(self, pose, &mut posed);
             for (index, joint) in self.rig.joints().iter().enumerate() {
-                let world = posed.world_from_rest[index].rotation;
-                let rotation = match joint.parent {
-                    None => {
-                        values.extend(posed.joints[0].iter());
-                        world
-                    }
-                    Some(parent) => posed.world_from_rest[parent].rotation.inverse() * world,
-                };
+                if joint.parent.is_none() {
+                    values.extend(posed.joints[index].iter());
+                }
+                let rotation = posed.parent_from_joint(self, index);
                 before[index] = angles_from_rotation(ORDER, rotation.matrix(), before[index]);
                 values.extend(before[index]);
             }

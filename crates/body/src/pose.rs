@@ -86,6 +86,15 @@ impl Shape {
     }
 }
 
+impl Posed {
+    /// Rotation of a joint relative to its parent; of the root, in the world.
+    pub fn parent_from_joint(&self, model: &BodyModel, joint: usize) -> Rotation3<f64> {
+        let world = self.world_from_rest[joint].rotation;
+        let parent = model.rig.joints()[joint].parent;
+        parent.map_or(world, |parent| self.world_from_rest[parent].rotation.inverse() * world)
+    }
+}
+
 /// Position and rotation of the root, and the axes of its DOFs: those of a rotation vector are the columns of SO(3)'s left
 /// Jacobian.
 fn place_root(rest: &Vector3<f64>, pose: &[f64], axes: &mut [Vector3<f64>]) -> (Vector3<f64>, Matrix3<f64>) {

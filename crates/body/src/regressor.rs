@@ -1,3 +1,5 @@
+mod fit;
+
 use nalgebra::Vector3;
 
 use crate::{Error, Result};
@@ -34,6 +36,15 @@ impl JointRegressor {
         Ok(Self { rows })
     }
 
+    /// Fits non-negative weights to meshes whose joints are known: for every joint those of vertices around it, by least
+    /// squares. One mesh is enough for its own joints; more tell how joints move with the shape.
+    ///
+    /// # Errors
+    /// [`Error::Regressor`] if there is no mesh, or meshes and joints don't have the same counts throughout.
+    pub fn fit(meshes: &[&[Vector3<f64>]], joints: &[&[Vector3<f64>]]) -> Result<Self> {
+        fit::fit(meshes, joints)
+    }
+
     /// Number of joints.
     pub fn num_joints(&self) -> usize {
         self.rows.len()
@@ -51,7 +62,12 @@ impl JointRegressor {
 
     /// The weighted mean of something that vertices have.
     pub(crate) fn joint(&self, joint: usize, of_vertex: impl Fn(usize) -> Vector3<f64>) -> Vector3<f64> {
-        let row = self.rows[joint].iter();
-        row.map(|&(vertex, weight)| of_vertex(vertex as usize) * f64::from(weight)).sum()
+        let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
+        for &(vertex, weight) in &self.rows[joint] {
+            sum += of_vertex(vertex as usize) * f64::from(weight);
+            weights += f64::from(weight);
+        }
+        // Weights in single precision sum to 1 only nearly: a body far from the origin would shift its joints.
+        sum / weights
     }
 }

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use body::{
-    Aligned, Alignment, LearnOptions, Learned, Posed, RegisteredOptions, Scan, Sex, Wanted, fit_registered,
-    heat_skin, learn,
+    Aligned, Alignment, BodyModel, LearnOptions, Learned, Posed, RegisteredOptions, RigFile, Scan, Template,
+    TemplateParts, fit_registered, learn,
 };
 use nalgebra::Vector3;
 use scans::Scans;
@@ -72,13 +72,13 @@ fn unposing_leaves_less_to_the_components() {
     let rest = |learned: &Learned| (1.0 - learned.variance_kept[19]) * learned.variance_m2;
     assert!(rest(unposed) < 0.6 * rest(&standing), "{} {}", rest(unposed), rest(&standing));
     // How each person really bent the elbows: column 11 and 22 of the angles used to make the scans, in degrees.
-    let angles = scans::floats(&folder.join("scans/pose_angles.npy"));
+    let angles = scans::numbers(&folder.join("scans/pose_angles.npy"));
     for (dof, column) in
         [("l_elbow", 11), ("r_elbow", 22), ("l_shoulder_abd", 8), ("l_hip_abd", 13), ("l_knee", 16)]
     {
         let d = data.template.rig.dof_index(dof).unwrap();
         let found: Vec<f64> = aligned.poses.iter().map(|pose| pose[d].to_degrees()).collect();
-        let truth: Vec<f64> = (0..found.len()).map(|i| f64::from(angles[31 * i + column])).collect();
+        let truth: Vec<f64> = (0..found.len()).map(|i| angles[31 * i + column]).collect();
         let correlation = correlation(&found, &truth);
         println!("{dof}: correlation of angles found and true {correlation:.3}");
         assert!(correlation > 0.7, "{dof}: {correlation}");
@@ -140,48 +140,59 @@ fn a_person_left_out_is_near_a_body_of_the_model() {
 }
 
 #[test]
-fn bodies_have_the_measurements_asked_for() {
-    let Some(_) = folder("bodies_have_the_measurements_asked_for") else { return };
-    let model = &learned().1.model;
-    for (sex, stature, mass) in [(Sex::Male, 1.85, 95.0), (Sex::Female, 1.58, 50.0), (Sex::Male, 1.70, 62.0)]
-    {
-        let wanted =
-            Wanted { stature_m: Some(stature), mass_kg: Some(mass), sex: Some(sex), age_years: Some(30.0) };
-        let alpha = model.alpha_for(&wanted).unwrap();
-        let found = model.shape(&alpha).measurements(model);
-        println!("{sex:?}: {found:.3?} alpha {alpha:.2?}");
-        assert!((found.stature_m - stature).abs() < 1e-3 && (found.mass_kg - mass).abs() < 0.05, "{found:?}");
-        assert!((found.arm_span_m / stature - 1.0).abs() < 0.08, "{found:?}");
-        assert!((0.40..0.52).contains(&(found.inseam_m / stature)), "{found:?}");
-        assert!((0.5..1.4).contains(&found.waist_m) && found.waist_m < found.hip_m, "{found:?}");
-        assert!((0.7..1.4).contains(&found.chest_m), "{found:?}");
+fn the_shipped_model_is_what_the_scans_teach() {
+    let Some(_) = folder("the_shipped_model_is_what_the_scans_teach") else { return };
+    let (learned, shipped) = (&learned().1.model, BodyModel::shipped());
+    // Sums differ in the last bit from one kind of processor to another.
+    let apart = distances(learned.mean(), shipped.mean()).into_iter().fold(0.0, f64::max);
+    assert!(apart < 1e-5, "{apart} m");
+    for (found, expected) in shipped.variance_kept().iter().zip(learned.variance_kept()) {
+        assert!((found - expected).abs() < 1e-5);
     }
-    let error = model.alpha_for(&Wanted { stature_m: Some(17.8), ..Wanted::default() }).unwrap_err();
-    assert_eq!(error.to_string(), "stature of 17.8 m was asked for, expected 1 to 2.4");
-    assert_eq!(model.alpha_for(&Wanted::default()).unwrap(), vec![0.0; 20]);
+    assert_eq!((shipped.rig(), shipped.skin()), (learned.rig(), learned.skin()));
 }
 
 #[test]
-fn age_and_sex_asked_for_change_the_body() {
-    let Some(_) = folder("age_and_sex_asked_for_change_the_body") else { return };
-    let model = &learned().1.model;
-    let body = |sex| {
-        let wanted = Wanted { stature_m: Some(1.7), mass_kg: Some(68.0), sex: Some(sex), age_years: None };
-        model.shape(&model.alpha_for(&wanted).unwrap()).measurements(model)
+fn joints_fitted_to_some_people_are_those_of_others() {
+    let Some(_) = folder("joints_fitted_to_some_people_are_those_of_others") else { return };
+    let data = data();
+    let mut file: serde_json::Value = serde_json::to_value(&data.file).unwrap();
+    file["joint_regressor"] = serde_json::json!({});
+    let file = RigFile::parse(file.to_string().as_bytes()).unwrap();
+    let known: Vec<_> = (0..60).map(|i| (data.scans[i].as_slice(), data.joints[i].as_slice())).collect();
+    let parts = TemplateParts {
+        faces: &data.template.faces,
+        rest: &data.template.rest,
+        rig: Some(&file),
+        skin: Some(&data.template.skin),
+        known_joints: &known,
     };
-    let (man, woman) = (body(Sex::Male), body(Sex::Female));
-    assert!(woman.hip_m - woman.waist_m > man.hip_m - man.waist_m + 0.03, "{woman:?} {man:?}");
+    let error = |template: &Template| {
+        let others = 60..114;
+        let of = |i: usize| spread(distances(&template.regressor.joints(&data.scans[i]), &data.joints[i]))[0];
+        others.clone().map(of).sum::<f64>() / others.len() as f64
+    };
+    let fitted = error(&Template::new(parts).unwrap());
+    let of_one = error(&Template::new(TemplateParts { known_joints: &[], ..parts }).unwrap());
+    let given = error(&data.template);
+    println!(
+        "joints fitted to 60 people: {fitted:.4} m, to the template's own: {of_one:.4} m, given: {given:.4} m"
+    );
+    // The given weights were fitted to all 114 people, these others among them.
+    assert!(fitted < 1.5 * given && fitted < of_one && of_one < 2.0 * given, "{fitted} {of_one} {given}");
 }
 
 #[test]
-fn a_file_is_read_as_it_was_written() {
-    let Some(_) = folder("a_file_is_read_as_it_was_written") else { return };
-    let model = &learned().1.model;
-    let bytes = model.to_bytes();
-    println!("{} bytes", bytes.len());
-    assert!(bytes.len() <= 1_500_000, "{} bytes", bytes.len());
-    let read = body::BodyModel::from_bytes(&bytes).unwrap();
-    assert_eq!(&read, model);
+fn what_a_template_lacks_is_said() {
+    let Some(_) = folder("what_a_template_lacks_is_said") else { return };
+    let Template { faces, rest, .. } = &data().template;
+    let parts = TemplateParts { faces, rest, rig: None, skin: None, known_joints: &[] };
+    assert_eq!(Template::new(parts).unwrap().skin, *BodyModel::shipped().skin());
+    let other: Vec<_> = faces.iter().rev().copied().collect();
+    let error = Template::new(TemplateParts { faces: &other, ..parts }).unwrap_err().to_string();
+    assert!(error.contains("needs a rig.json with joints"), "{error}");
+    let error = Template::new(TemplateParts { faces: &faces[1..], ..parts }).unwrap_err().to_string();
+    assert!(error.contains("3 open edges"), "{error}");
 }
 
 #[test]
@@ -189,11 +200,10 @@ fn weights_of_heat_pose_as_the_given_ones_do() {
     let Some(_) = folder("weights_of_heat_pose_as_the_given_ones_do") else { return };
     let data = data();
     let template = &data.template;
-    let joints = template.regressor.joints(&template.rest);
-    let skin = heat_skin(&template.rest, &template.faces, &template.rig, &joints).unwrap();
     let given = data.model_of(0, &[]);
-    let mut parts = template.clone();
-    parts.skin = skin;
+    let (faces, rest) = (&template.faces, &template.rest);
+    let parts = TemplateParts { faces, rest, rig: Some(&data.file), skin: None, known_joints: &[] };
+    let parts = Template::new(parts).unwrap();
     let options = LearnOptions { alignment: Alignment::Turned, components: 1, ..LearnOptions::default() };
     let heat = learn(&data.base()[..2], &parts, &options).unwrap().model;
     for (name, angles) in [
@@ -209,27 +219,6 @@ fn weights_of_heat_pose_as_the_given_ones_do() {
         let [mean, high] = spread(distances(&a.vertices, &b.vertices));
         println!("{name}: {:.1} mm, 95 % {:.1} mm", mean * 1000.0, high * 1000.0);
         assert!(mean < 0.010 && high < 0.045, "{name}: {mean} {high}");
-    }
-}
-
-#[test]
-fn a_motion_puts_the_joints_where_the_poses_put_them() {
-    let Some(_) = folder("a_motion_puts_the_joints_where_the_poses_put_them") else { return };
-    let model = data().model_of(0, &[1]);
-    let shape = model.shape(&[0.3]);
-    let poses: Vec<Vec<f64>> = (0..30)
-        .map(|f| (0..model.rig().num_dofs()).map(|d| 0.02 * f as f64 * (d as f64 + 1.0).sin()).collect())
-        .collect();
-    let motion = model.motion(&shape, &poses, 30.0).unwrap();
-    let skeleton = motion.skeleton();
-    let kinematics = kinematics::Kinematics::new(skeleton, kinematics::Parametrisation::channels(skeleton));
-    let (mut state, mut posed) = (kinematics.state(), Posed::default());
-    for (values, pose) in motion.poses().zip(&poses) {
-        kinematics.update(values, &mut state);
-        shape.pose_joints(&model, pose, &mut posed);
-        for (joint, expected) in posed.joints.iter().enumerate() {
-            assert!((state.point(joint, &Vector3::zeros()) - expected).norm() < 1e-9, "joint {joint}");
-        }
     }
 }
 

@@ -1,16 +1,8 @@
-//! Posing and its derivatives, on the scans of the shared data.
-
-mod scans;
+//! Posing and its derivatives, on the shipped model.
 
 use body::{BodyModel, Limb, Posed, Shape, ShapeDrift};
 use kinematics::check_jacobian;
 use nalgebra::{Matrix4, Rotation3, Unit, Vector3};
-use scans::Scans;
-
-fn model(test: &str) -> Option<BodyModel> {
-    let bodies = testdata::shared("data/bodies", test)?;
-    Some(Scans::read(&bodies).model_of(0, &[1, 5, 9]))
-}
 
 /// A pose with every number different from 0.
 fn pose(model: &BodyModel) -> Vec<f64> {
@@ -42,7 +34,7 @@ fn transforms(model: &BodyModel, shape: &Shape, pose: &[f64]) -> Vec<Matrix4<f64
 
 #[test]
 fn posing_follows_the_convention_of_the_rig() {
-    let Some(model) = model("posing_follows_the_convention_of_the_rig") else { return };
+    let model = BodyModel::shipped();
     let (shape, pose) = (model.shape(&[0.5, -1.0]), pose(&model));
     let mut posed = Posed::default();
     shape.pose(&model, &pose, &mut posed);
@@ -69,7 +61,7 @@ fn posing_follows_the_convention_of_the_rig() {
 
 #[test]
 fn at_rest_nothing_moves() {
-    let Some(model) = model("at_rest_nothing_moves") else { return };
+    let model = BodyModel::shipped();
     let shape = model.shape(&[1.0, 2.0, -1.0]);
     let mut posed = Posed::default();
     shape.pose(&model, &vec![0.0; model.rig().num_dofs()], &mut posed);
@@ -80,7 +72,7 @@ fn at_rest_nothing_moves() {
 
 #[test]
 fn derivatives_by_the_pose_are_those_of_differences() {
-    let Some(model) = model("derivatives_by_the_pose_are_those_of_differences") else { return };
+    let model = BodyModel::shipped();
     let (shape, pose) = (model.shape(&[0.5, -1.0, 0.7]), pose(&model));
     let vertices: Vec<u32> = (0..model.num_vertices() as u32).step_by(97).collect();
     let joints = model.rig().num_joints();
@@ -110,8 +102,9 @@ fn derivatives_by_the_pose_are_those_of_differences() {
 
 #[test]
 fn derivatives_by_the_shape_are_those_of_differences() {
-    let Some(model) = model("derivatives_by_the_shape_are_those_of_differences") else { return };
-    let (alpha, pose) = ([0.5, -1.0, 0.7], pose(&model));
+    let model = BodyModel::shipped();
+    let pose = pose(&model);
+    let alpha: Vec<f64> = (0..model.num_components()).map(|i| (i as f64 + 0.5).sin()).collect();
     let vertices: Vec<u32> = (0..model.num_vertices() as u32).step_by(97).collect();
     let joints = model.rig().num_joints();
     let mut posed = Posed::default();
@@ -142,7 +135,7 @@ fn derivatives_by_the_shape_are_those_of_differences() {
 
 #[test]
 fn every_limb_has_its_vertices_on_its_side() {
-    let Some(model) = model("every_limb_has_its_vertices_on_its_side") else { return };
+    let model = BodyModel::shipped();
     for limb in Limb::ALL {
         let of_limb = || model.limbs().iter().zip(model.mean()).filter(|(l, _)| **l == limb).map(|(_, v)| v);
         assert!(of_limb().count() > 50, "{limb:?} has {} vertices", of_limb().count());
@@ -161,7 +154,7 @@ fn every_limb_has_its_vertices_on_its_side() {
 
 #[test]
 fn posing_again_takes_no_memory() {
-    let Some(model) = model("posing_again_takes_no_memory") else { return };
+    let model = BodyModel::shipped();
     let (mut shape, pose) = (model.shape(&[0.5]), pose(&model));
     let (mut posed, mut drift) = (Posed::default(), ShapeDrift::default());
     let mut once = || {

@@ -4,11 +4,11 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 
-use super::check::{check_scan, check_template};
-use super::{Alignment, LearnOptions, Scan, Template, principal};
+use super::check::check_scan;
+use super::{Alignment, LearnOptions, Scan, principal};
 use crate::population::Subject;
 use crate::procrustes::rigid;
-use crate::{BodyModel, Posed, RegisteredOptions, Result, fit_registered};
+use crate::{BodyModel, Posed, RegisteredOptions, Result, Template, fit_registered};
 
 /// Components of the model of every round, and how far its vertices may be off, metres. The first components are size and
 /// build; later ones, before the poses are out, are poses. What few components can't show must not be taken for pose, so
@@ -35,9 +35,8 @@ impl Aligned {
     /// model to every scan ([`fit_registered`]), undoes the pose ([`unpose`]), and learns the next model, of more components.
     ///
     /// # Errors
-    /// [`crate::Error::Scan`] names the first scan that is wrong; [`crate::Error::Template`].
+    /// [`crate::Error::Scan`] names the first scan that is wrong.
     pub fn new(scans: &[Scan<'_>], template: &Template, options: &LearnOptions) -> Result<Self> {
-        check_template(template)?;
         scans.par_iter().map(|scan| check_scan(scan, template)).collect::<Result<Vec<()>>>()?;
         let stands = |scan: &Scan<'_>| match options.alignment {
             Alignment::AsTheyStand => scan.vertices.to_vec(),

@@ -12,23 +12,19 @@ const HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.8..=2.6;
 /// Mean distance from the template, after turning and scaling, beyond which vertices must be in another order, metres.
 const MOST_APART_M: f64 = 0.15;
 
-/// Checks that the template's mesh is closed, looks outwards and fits its skin.
-pub fn check_template(template: &Template) -> crate::Result<()> {
+/// Checks that a template's mesh is closed, looks outwards, and is of a person's size.
+pub fn check_template(rest: &[Vector3<f64>], faces: &[[u32; 3]]) -> crate::Result<()> {
     let fail = |what: String| Err(Error::Template { what });
-    let mesh = model::Mesh::new(template.rest.clone(), template.faces.clone())
-        .map_err(|e| Error::Template { what: e.to_string() })?;
-    let open = open_edges(&template.faces);
-    if open > 0 {
-        return fail(format!("mesh has {open} open edges, expected a closed mesh"));
+    let mesh = model::Mesh::new(rest.to_vec(), faces.to_vec());
+    let mesh = mesh.map_err(|e| Error::Template { what: e.to_string() })?;
+    let open = open_edges(faces);
+    if open > 0 || faces.is_empty() {
+        return fail(format!("mesh has {} faces and {open} open edges, expected a closed mesh", faces.len()));
     }
     if !(mesh.volume() > 0.0) {
         return fail("faces look inwards, expected corners counter-clockwise seen from outside".into());
     }
-    if template.skin.num_vertices() != template.rest.len() {
-        let (found, expected) = (template.skin.num_vertices(), template.rest.len());
-        return fail(format!("skin has {found} vertices, the mesh {expected}"));
-    }
-    check_size(&template.rest).or_else(|what| fail(what))
+    check_size(rest).or_else(fail)
 }
 
 /// Checks one scan against the template.

@@ -1,7 +1,7 @@
 //! Learning a model from registered scans of people in the base pose: check, align, unpose, principal components.
 
 mod align;
-mod check;
+pub(crate) mod check;
 mod pca;
 
 use nalgebra::Vector3;
@@ -10,22 +10,7 @@ pub use align::{Aligned, unpose};
 pub(crate) use pca::ends;
 
 use crate::population::{Population, Subject};
-use crate::{BodyModel, Error, JointRegressor, MAX_COMPONENTS, ModelParts, Result, Rig, Skin};
-
-/// What all scans have in common: topology, skeleton and skin.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Template {
-    /// corners of every triangle, counter-clockwise seen from outside; a closed mesh
-    pub faces: Vec<[u32; 3]>,
-    /// a body in the base pose, metres, y up, facing +z, shape `[vertices]`
-    pub rest: Vec<Vector3<f64>>,
-    /// joints and degrees of freedom
-    pub rig: Rig,
-    /// joints from vertices
-    pub regressor: JointRegressor,
-    /// what moves the vertices
-    pub skin: Skin,
-}
+use crate::{BodyModel, Error, MAX_COMPONENTS, ModelParts, Result, Template};
 
 /// A registered scan: a body in the template's topology and about in its pose.
 #[derive(Debug, Clone, Copy, PartialEq)]

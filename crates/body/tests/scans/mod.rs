@@ -3,19 +3,25 @@
 
 use std::{fs, path::Path};
 
-use body::{BodyModel, ModelParts, RigFile, Scan, Sex, Skin, Subject, Template};
+use body::{BodyModel, ModelParts, RigFile, Scan, Sex, Skin, Subject, Template, TemplateParts};
 use nalgebra::Vector3;
 
-/// Numbers of an NPY file: what follows its header, in pieces of `N` bytes.
-fn numbers<const N: usize>(path: &Path) -> Vec<[u8; N]> {
+/// Numbers of an NPY file.
+pub fn numbers(path: &Path) -> Vec<f64> {
     let bytes = fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    let header = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    bytes[10 + header..].as_chunks::<N>().0.to_vec()
+    formats::npy::read(&bytes).unwrap_or_else(|e| panic!("{}: {e}", path.display())).values
+}
+
+fn points(numbers: &[f64], scale: f64) -> Vec<Vector3<f64>> {
+    numbers.as_chunks::<3>().0.iter().map(|&p| Vector3::from(p) * scale).collect()
 }
 
 /// Scans, what is known of the people, and the template of `bodies` in the shared data.
 pub struct Scans {
     pub template: Template,
+    pub file: RigFile,
+    /// true positions, metres, shape `[scans][joints]`
+    pub joints: Vec<Vec<Vector3<f64>>>,
     /// metres, shape `[scans][vertices]`
     pub scans: Vec<Vec<Vector3<f64>>>,
     /// subject and pose of every scan, as in `scans.csv`
@@ -26,18 +32,16 @@ pub struct Scans {
 
 impl Scans {
     pub fn read(bodies: &Path) -> Self {
-        let faces: Vec<u32> =
-            numbers::<4>(&bodies.join("scans/faces.npy")).into_iter().map(u32::from_le_bytes).collect();
-        let steps: Vec<f64> = numbers::<2>(&bodies.join("scans/vertices.npy"))
-            .into_iter()
-            .map(|b| f64::from(i16::from_le_bytes(b)) * 1e-4)
-            .collect();
-        let points: Vec<_> = steps.as_chunks::<3>().0.iter().map(|&p| Vector3::from(p)).collect();
-        let joints = numbers::<4>(&bodies.join("rig/skin_joints.npy"));
-        let weights = floats(&bodies.join("rig/skin_weights.npy"));
+        let corners: Vec<u32> = numbers(&bodies.join("scans/faces.npy")).iter().map(|&x| x as u32).collect();
+        let faces = corners.as_chunks::<3>().0.to_vec();
+        let vertices = points(&numbers(&bodies.join("scans/vertices.npy")), 1e-4);
+        let joints: Vec<u8> = numbers(&bodies.join("rig/skin_joints.npy")).iter().map(|&x| x as u8).collect();
+        let joints = joints.as_chunks::<4>().0;
+        let weights: Vec<f32> =
+            numbers(&bodies.join("rig/skin_weights.npy")).iter().map(|&x| x as f32).collect();
         let file = RigFile::parse(&fs::read(bodies.join("rig/rig.json")).unwrap()).unwrap();
-        let rig = file.rig().unwrap();
-        let scans: Vec<Vec<_>> = points.chunks_exact(joints.len()).map(<[_]>::to_vec).collect();
+        let skin = Skin::new(joints, weights.as_chunks::<4>().0, file.rig().unwrap().num_joints()).unwrap();
+        let scans: Vec<Vec<_>> = vertices.chunks_exact(joints.len()).map(<[_]>::to_vec).collect();
         let subjects = rows(&bodies.join("scans/subjects.csv")).into_iter().map(|row| Subject {
             sex: Some(if row[1] == "male" { Sex::Male } else { Sex::Female }),
             age_years: row[2].parse().ok(),
@@ -47,13 +51,19 @@ impl Scans {
         Self {
             subjects: subjects.collect(),
             names: names.collect(),
-            template: Template {
-                faces: faces.as_chunks::<3>().0.to_vec(),
-                rest: mean(&scans[..114]),
-                regressor: file.regressor(joints.len()).unwrap().unwrap(),
-                skin: Skin::new(&joints, weights.as_chunks::<4>().0, rig.num_joints()).unwrap(),
-                rig,
-            },
+            joints: points(&numbers(&bodies.join("scans/joints.npy")), 1.0)
+                .chunks_exact(file.rig().unwrap().num_joints())
+                .map(<[_]>::to_vec)
+                .collect(),
+            template: Template::new(TemplateParts {
+                faces: &faces,
+                rest: &mean(&scans[..114]),
+                rig: Some(&file),
+                skin: Some(&skin),
+                known_joints: &[],
+            })
+            .unwrap(),
+            file,
             scans,
         }
     }
@@ -92,11 +102,6 @@ fn mean(scans: &[Vec<Vector3<f64>>]) -> Vec<Vector3<f64>> {
     let mut sum = vec![Vector3::zeros(); scans[0].len()];
     scans.iter().for_each(|scan| sum.iter_mut().zip(scan).for_each(|(sum, v)| *sum += v));
     sum.into_iter().map(|v| v / scans.len() as f64).collect()
-}
-
-/// Numbers of an NPY file in single precision.
-pub fn floats(path: &Path) -> Vec<f32> {
-    numbers::<4>(path).into_iter().map(f32::from_le_bytes).collect()
 }
 
 /// Cells of a CSV file, without the first row.
