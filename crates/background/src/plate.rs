@@ -166,27 +166,27 @@ fn find_place(plate: &Grey, reference: &Grey, edges: &[Edge], max_shift: u32) ->
     let coarse: Vec<&Edge> = edges.iter().step_by(edges.len().div_ceil(3000).max(1)).collect();
     let mut best = (f64::INFINITY, candidates[0]);
     for candidate in candidates {
-        let gain = coarse_gain(plate, reference, candidate);
+        let line = coarse_brightness(plate, reference, candidate);
         for dy in -reach..=reach {
             for dx in -reach..=reach {
                 let shift = [candidate.shift[0] + f64::from(dx), candidate.shift[1] + f64::from(dy)];
                 let place = Place { shift, ..candidate };
-                let cost = cost(plate, coarse.iter().copied(), place, gain);
+                let cost = cost(plate, coarse.iter().copied(), place, line);
                 if cost < best.0 {
                     best = (cost, place);
                 }
             }
         }
     }
-    let gain = coarse_gain(plate, reference, best.1);
-    let mut best = (cost(plate, edges, best.1, gain), best.1);
+    let line = coarse_brightness(plate, reference, best.1);
+    let mut best = (cost(plate, edges, best.1, line), best.1);
     for step in [0.5, 0.25] {
         for _ in 0..2 {
             let centre = best.1;
             for (dx, dy) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (f64::from(dx), f64::from(dy)))) {
                 let shift = [centre.shift[0] + step * dx, centre.shift[1] + step * dy];
                 let place = Place { shift, ..centre };
-                let cost = cost(plate, edges, place, gain);
+                let cost = cost(plate, edges, place, line);
                 if cost < best.0 {
                     best = (cost, place);
                 }
@@ -197,35 +197,46 @@ fn find_place(plate: &Grey, reference: &Grey, edges: &[Edge], max_shift: u32) ->
 }
 
 /// Mean clipped difference of brightness.
-fn cost<'a>(plate: &Grey, edges: impl IntoIterator<Item = &'a Edge>, place: Place, gain: f32) -> f64 {
+fn cost<'a>(
+    plate: &Grey,
+    edges: impl IntoIterator<Item = &'a Edge>,
+    place: Place,
+    [gain, offset]: [f32; 2],
+) -> f64 {
     let (scale, shift) = (place.scale.map(|s| s as f32), place.shift.map(|s| s as f32));
     let (mut sum, mut count) = (0.0f64, 0usize);
     for edge in edges {
         let found = plate.sample(scale[0] * edge.x + shift[0], scale[1] * edge.y + shift[1]);
         // where the plate ends, it neither fits nor misfits
-        let difference = found.map_or(CLIP / 2.0, |value| (gain * value - edge.value).abs().min(CLIP));
+        let difference =
+            found.map_or(CLIP / 2.0, |value| (gain * value + offset - edge.value).abs().min(CLIP));
         sum += f64::from(difference);
         count += 1;
     }
     if count == 0 { 0.0 } else { sum / count as f64 }
 }
 
-/// Median ratio of the reference's brightness to the plate's.
-fn coarse_gain(plate: &Grey, reference: &Grey, place: Place) -> f32 {
-    let mut ratios = Vec::new();
+/// Gain and offset that bring the plate's brightness to the reference's, by their 10th, 50th and 90th percentiles.
+fn coarse_brightness(plate: &Grey, reference: &Grey, place: Place) -> [f32; 2] {
+    let (mut own, mut expected) = (Vec::new(), Vec::new());
     for y in (4..reference.height).step_by(8) {
         for x in (4..reference.width).step_by(8) {
             let [u, v] = place.at(x as f64, y as f64);
-            let value = reference.get(x, y) as f32;
-            if let Some(found) =
-                plate.sample(u as f32, v as f32).filter(|found| (20.0..240.0).contains(found))
-            {
-                ratios.push(value / found);
+            if let Some(found) = plate.sample(u as f32, v as f32) {
+                own.push(found);
+                expected.push(reference.get(x, y) as f32);
             }
         }
     }
-    let half = ratios.len() / 2;
-    if ratios.is_empty() { 1.0 } else { *ratios.select_nth_unstable_by(half, f32::total_cmp).1 }
+    if own.is_empty() {
+        return [1.0, 0.0];
+    }
+    own.sort_by(f32::total_cmp);
+    expected.sort_by(f32::total_cmp);
+    let at = |values: &[f32], share: usize| values[(values.len() - 1) * share / 100];
+    let spread = |values: &[f32]| (at(values, 90) - at(values, 10)).max(1.0);
+    let gain = (spread(&expected) / spread(&own)).clamp(0.25, 4.0);
+    [gain, at(&expected, 50) - gain * at(&own, 50)]
 }
 
 /// Means of square blocks, where the plate is at least twice as large: it is to be as smooth as the frames.
