@@ -152,7 +152,7 @@ impl System {
         let enough = 1e-14 * energy;
         let mut image = vec![0.0; n];
         for _ in 0..2000 {
-            if !(energy > enough) {
+            if energy <= enough || energy.is_nan() {
                 break;
             }
             for i in 0..n {

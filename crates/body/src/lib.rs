@@ -47,7 +47,7 @@ pub use rig::{Dof, DofKind, ROOT_DOFS, Rig, RigJoint};
 pub use rig_json::RigFile;
 pub use shape::{BodyModel, MAX_COMPONENTS, MAX_VERTICES, ModelParts, Shape};
 pub use skin::Skin;
-pub use template::{Template, TemplateParts};
+pub use template::{KnownJoints, Template, TemplateParts};
 
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -23,7 +23,7 @@ impl JointRegressor {
                 return fail(format!("uses vertex {vertex}, expected indices below {num_vertices}"));
             }
             let sum: f64 = row.iter().map(|(_, weight)| f64::from(*weight)).sum();
-            if !((sum - 1.0).abs() < 0.01) {
+            if (sum - 1.0).abs() > 0.01 || row.iter().any(|(_, weight)| !weight.is_finite()) {
                 return fail(format!("has weights that sum to {sum}, expected 1"));
             }
             // Numbers already rounded must stay as they are, or a file would not be read as it was written.

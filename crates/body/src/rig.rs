@@ -169,7 +169,7 @@ fn check_dof(index: usize, dof: &mut Dof, num_joints: usize) -> Result<()> {
         return fail("belongs to the root or is a translation, expected a rotation of another joint".into());
     }
     let length = dof.axis.norm();
-    if !((length - 1.0).abs() < 1e-3) {
+    if (length - 1.0).abs() > 1e-3 || length.is_nan() {
         return fail(format!("has an axis of length {length}, expected 1"));
     }
     // What is a unit vector already stays as it is, or a file would not be read as it was written.

@@ -77,6 +77,12 @@ impl Component {
     }
 }
 
+/// Whether all coordinates are finite and no larger than a person's.
+fn is_near(v: &Vector3<f64>) -> bool {
+    // Not by `amax`, which passes over what is not a number.
+    v.iter().all(|x| x.abs() <= MOST_M)
+}
+
 impl BodyModel {
     /// Checks that the parts fit together, and rounds the numbers as the file does: a model that was written and read
     /// is the same to the bit.
@@ -93,7 +99,7 @@ impl BodyModel {
             );
             return Err(Error::Model { what });
         }
-        if parts.components.iter().flatten().any(|d| !(d.amax() <= MOST_M)) {
+        if parts.components.iter().flatten().any(|d| !is_near(d)) {
             let what = format!("a component moves a vertex by more than {MOST_M} m or not finitely");
             return Err(Error::Model { what });
         }
@@ -113,7 +119,7 @@ impl BodyModel {
                 components.len()
             ));
         }
-        if let Some(vertex) = mean.iter().position(|v| !(v.amax() <= MOST_M)) {
+        if let Some(vertex) = mean.iter().position(|v| !is_near(v)) {
             return fail(format!("vertex {vertex} of the mean is beyond {MOST_M} m"));
         }
         if let Some(face) = faces.iter().position(|face| face.iter().any(|&corner| corner as usize >= n)) {

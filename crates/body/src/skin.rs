@@ -33,7 +33,7 @@ impl Skin {
         for (vertex, (&joints, &weights)) in joints.iter().zip(weights).enumerate() {
             let fail = |what: String| Err(Error::Skin { what: format!("vertex {vertex} {what}") });
             let sum: f64 = weights.iter().map(|&weight| f64::from(weight)).sum();
-            if !((sum - 1.0).abs() < 0.01) || weights.iter().any(|weight| *weight < 0.0) {
+            if (sum - 1.0).abs() > 0.01 || weights.iter().any(|weight| *weight < 0.0 || weight.is_nan()) {
                 return fail(format!("has weights {weights:?}, expected four that sum to 1"));
             }
             let mut pairs: [(u16, u8); INFLUENCES] = std::array::from_fn(|k| {

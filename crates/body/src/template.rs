@@ -18,6 +18,15 @@ pub struct Template {
     pub skin: Skin,
 }
 
+/// A mesh of the topology and its joints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownJoints<'a> {
+    /// metres, shape `[vertices]`
+    pub vertices: &'a [Vector3<f64>],
+    /// metres, shape `[joints]`
+    pub joints: &'a [Vector3<f64>],
+}
+
 /// What there is of a template; the rest is computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemplateParts<'a> {
@@ -29,9 +38,8 @@ pub struct TemplateParts<'a> {
     pub rig: Option<&'a RigFile>,
     /// skinning weights; computed by [`heat_skin`] if `None`
     pub skin: Option<&'a Skin>,
-    /// meshes of the topology and the positions of their joints, shape `[joints]` each; used if the rig doesn't say how
-    /// joints follow from vertices
-    pub known_joints: &'a [(&'a [Vector3<f64>], &'a [Vector3<f64>])],
+    /// meshes whose joints are known; used if the rig doesn't say how joints follow from vertices
+    pub known_joints: &'a [KnownJoints<'a>],
 }
 
 impl Template {
@@ -51,7 +59,8 @@ impl Template {
         let regressor = match (file.regressor(rest.len())?, &at_rest) {
             (Some(regressor), _) => regressor,
             (None, _) if !parts.known_joints.is_empty() => {
-                let (meshes, joints): (Vec<_>, Vec<_>) = parts.known_joints.iter().copied().unzip();
+                let (meshes, joints): (Vec<_>, Vec<_>) =
+                    parts.known_joints.iter().map(|known| (known.vertices, known.joints)).unzip();
                 JointRegressor::fit(&meshes, &joints)?
             }
             (None, Some(joints)) => JointRegressor::fit(&[rest], &[joints])?,

@@ -1,6 +1,6 @@
 //! The model's file: round trip, and files that are damaged or hostile.
 
-use body::{BodyModel, Error, MAX_BYTES, RigFile};
+use body::{BodyModel, Error, MAX_BYTES, ModelParts, RigFile};
 use proptest::prelude::*;
 
 /// A file with some bytes changed and the checksum put right again: what damage by intent looks like.
@@ -74,6 +74,25 @@ fn headers_that_lie_are_refused() {
         let error = BodyModel::from_bytes(&bytes).unwrap_err().to_string();
         assert!(error.contains(expected), "{to}: {error}");
     }
+}
+
+#[test]
+fn a_mean_that_is_not_finite_is_refused() {
+    let model = BodyModel::shipped();
+    let mut parts = ModelParts {
+        description: String::new(),
+        faces: model.faces().to_vec(),
+        mean: model.mean().to_vec(),
+        components: Vec::new(),
+        variance_kept: Vec::new(),
+        rig: model.rig().clone(),
+        regressor: model.regressor().clone(),
+        skin: model.skin().clone(),
+    };
+    assert_eq!(BodyModel::new(parts.clone()).unwrap().num_components(), 0);
+    parts.mean[77].x = f64::NAN;
+    let error = BodyModel::new(parts).unwrap_err().to_string();
+    assert!(error.contains("vertex 77"), "{error}");
 }
 
 #[test]

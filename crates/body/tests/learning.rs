@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use body::{
-    Aligned, Alignment, BodyModel, LearnOptions, Learned, Posed, RegisteredOptions, RigFile, Scan, Template,
-    TemplateParts, fit_registered, learn,
+    Aligned, Alignment, BodyModel, KnownJoints, LearnOptions, Learned, Posed, RegisteredOptions, RigFile,
+    Scan, Template, TemplateParts, fit_registered, learn,
 };
 use nalgebra::Vector3;
 use scans::Scans;
@@ -159,7 +159,8 @@ fn joints_fitted_to_some_people_are_those_of_others() {
     let mut file: serde_json::Value = serde_json::to_value(&data.file).unwrap();
     file["joint_regressor"] = serde_json::json!({});
     let file = RigFile::parse(file.to_string().as_bytes()).unwrap();
-    let known: Vec<_> = (0..60).map(|i| (data.scans[i].as_slice(), data.joints[i].as_slice())).collect();
+    let known: Vec<_> =
+        (0..60).map(|i| KnownJoints { vertices: &data.scans[i], joints: &data.joints[i] }).collect();
     let parts = TemplateParts {
         faces: &data.template.faces,
         rest: &data.template.rest,

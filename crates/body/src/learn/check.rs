@@ -21,7 +21,7 @@ pub fn check_template(rest: &[Vector3<f64>], faces: &[[u32; 3]]) -> crate::Resul
     if open > 0 || faces.is_empty() {
         return fail(format!("mesh has {} faces and {open} open edges, expected a closed mesh", faces.len()));
     }
-    if !(mesh.volume() > 0.0) {
+    if mesh.volume() <= 0.0 {
         return fail("faces look inwards, expected corners counter-clockwise seen from outside".into());
     }
     check_size(rest).or_else(fail)
@@ -69,7 +69,7 @@ fn check_topology(scan: &Scan<'_>, template: &Template) -> Result<(), String> {
 /// Axes, from the similarity that brings the template to the scan: registered vertices tell every turn and mirroring.
 fn check_axes(scan: &[Vector3<f64>], template: &[Vector3<f64>]) -> Result<(), String> {
     let Rigid { rotation, is_mirrored, scale, .. } = rigid(template.iter().zip(scan));
-    if !(scale > 0.0) {
+    if scale <= 0.0 || scale.is_nan() {
         return Err("all vertices are in one place".into());
     }
     if is_mirrored {
