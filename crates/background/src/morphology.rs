@@ -56,8 +56,7 @@ fn step<const GROW: bool>(from: &Silhouette, to: &mut Silhouette, to_diagonals: 
         let row = from.row(y);
         let above = y.checked_sub(1).map(|y| from.row(y));
         let below = (y + 1 < height).then(|| from.row(y + 1));
-        let target = to.row_mut(y);
-        for i in 0..count {
+        for (i, target) in to.row_mut(y).iter_mut().enumerate() {
             let mask = |i| if i + 1 == count { last_mask } else { u64::MAX };
             let load = |row: &[u64], i: usize| if GROW { row[i] } else { !row[i] & mask(i) };
             let wide = |row: &[u64]| {
@@ -72,7 +71,7 @@ fn step<const GROW: bool>(from: &Silhouette, to: &mut Silhouette, to_diagonals: 
                 None => 0,
             };
             let grown = wide(row) | beside(above) | beside(below);
-            target[i] = if GROW { grown } else { !grown } & mask(i);
+            *target = if GROW { grown } else { !grown } & mask(i);
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::{
 #[derive(Debug, Clone)]
 pub enum BackgroundModel {
     /// one colour a pixel, of a plate or learned from the clip
-    Distortion(Distortion),
+    Distortion(Box<Distortion>),
     /// several colours a pixel
     Mixture(Mixture),
 }
@@ -88,10 +88,10 @@ impl Segmenter {
                 prospects.ghost_share = ghosts.area() as f64 / (width * height) as f64;
                 prospects.plate_differing = aligned.alignment.differing;
                 alignment = Some(aligned.alignment);
-                BackgroundModel::Distortion(model)
+                BackgroundModel::Distortion(Box::new(model))
             }
             (ModelKind::Adaptive | ModelKind::Auto, _) => {
-                BackgroundModel::Distortion(Distortion::adaptive(parameters, sample, &statistics))
+                BackgroundModel::Distortion(Box::new(Distortion::adaptive(parameters, sample, &statistics)))
             }
             (ModelKind::Mixture, _) => BackgroundModel::Mixture(Mixture::new(parameters, sample)),
         };

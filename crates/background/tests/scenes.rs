@@ -29,7 +29,7 @@ const PLAIN: Scene =
 /// A wall with spots of several sizes; `at` shifts them, for what moves.
 fn wall(x: f64, y: f64, at: f64) -> [f64; 3] {
     let spots = (0.11 * (x + at)).sin() * (0.07 * y).cos() + 0.5 * (0.53 * (x + at) + 0.31 * y).sin();
-    let panel = if ((x / 40.0) as usize + (y / 35.0) as usize) % 2 == 0 { 12.0 } else { -6.0 };
+    let panel = if ((x / 40.0) as usize + (y / 35.0) as usize).is_multiple_of(2) { 12.0 } else { -6.0 };
     [120.0 + 18.0 * spots + panel, 125.0 + 15.0 * spots + panel, 115.0 + 12.0 * spots - panel]
 }
 
