@@ -253,7 +253,7 @@ fn a_file_that_was_not_finished_is_removed() {
     let nowhere = folder.path().join("nowhere/overlay.mp4");
     let mut writer = FrameWriter::create(nowhere, [64, 48], &WriteOptions::default()).unwrap();
     let error = (0..1000).find_map(|_| writer.write(&Image::black(64, 48)).err());
-    let error = error.map_or_else(|| writer.finish().unwrap_err(), |error| error);
+    let error = error.unwrap_or_else(|| writer.finish().unwrap_err());
     assert!(error.to_string().contains("No such file"), "{error}");
 }
 
