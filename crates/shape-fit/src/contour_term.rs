@@ -184,3 +184,61 @@ impl Term<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use kinematics::check_jacobian;
+    use model::Camera;
+    use vision::{View, scene::Ring};
+
+    use super::*;
+
+    fn posed(model: &BodyModel, x: &[f64]) -> PosedBody {
+        let (pose, alpha) = x.split_at(model.rig().num_dofs());
+        let shape = model.shape(alpha);
+        let mut body = PosedBody::default();
+        shape.pose(model, pose, &mut body.posed);
+        body.drift.update(model, &body.posed);
+        body.shape = Some(shape);
+        body
+    }
+
+    #[test]
+    fn the_derivative_of_a_rim_point_in_the_image_is_that_of_differences() {
+        let model = BodyModel::shipped();
+        let width = model.rig().num_dofs() + model.num_components();
+        let x: Vec<f64> = (0..width).map(|i| 0.4 * (i as f64 * 1.7).sin()).collect();
+        let topology = Topology::new(model.faces(), model.num_vertices());
+        let camera: Camera = Ring::default().cameras().swap_remove(1);
+        let view = View::new(&camera);
+        let body = posed(&model, &x);
+        let mut drawn = Silhouette::empty(0, 0);
+        Rasteriser::new().silhouette(&view, &body.posed.vertices, &topology, &mut drawn);
+        let mut rim = Vec::new();
+        find_rim(&view, &body.posed.vertices, &topology, &drawn, REACH_PX, &mut rim);
+        assert!(rim.len() > 200, "{} points", rim.len());
+        let weighting = Weighting { scale_m: 0.1, tangential: 0.1, normal_m: 0.1 };
+        let term =
+            Term { model: &model, topology: &topology, body: &body, weighting, options: &Options::default() };
+        let chosen: Vec<&RimPoint> = rim.iter().step_by(rim.len() / 12).collect();
+        let mut jacobian = Vec::new();
+        let mut derivatives = vec![Vector3::zeros(); 2 * width];
+        for point in &chosen {
+            let (_, by_point) = camera.project_with_jacobian(&point.point).unwrap();
+            term.differentiate(point.vertices, &mut derivatives);
+            for axis in 0..2 {
+                let along = by_point.row(axis).transpose();
+                let of_both = derivatives[..width].iter().zip(&derivatives[width..]);
+                jacobian.extend(of_both.map(|(from, to)| 0.5 * along.dot(&(from + to))));
+            }
+        }
+        check_jacobian(&x, 2 * chosen.len(), &jacobian, 1e-4, |x, pixels| {
+            let vertices = posed(&model, x).posed.vertices;
+            for (point, pixel) in chosen.iter().zip(pixels.chunks_exact_mut(2)) {
+                let [from, to] = point.vertices.map(|vertex| vertices[vertex as usize]);
+                pixel.copy_from_slice(camera.project(&((from + to) / 2.0)).unwrap().as_slice());
+            }
+        })
+        .unwrap();
+    }
+}

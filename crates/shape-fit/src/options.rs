@@ -15,6 +15,6 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { sigma_m: 0.004, correlation_m: 0.10, least_iou: 0.72, leave_out_bad_view: false }
+        Self { sigma_m: 0.004, correlation_m: 0.10, least_iou: 0.75, leave_out_bad_view: false }
     }
 }

@@ -1,6 +1,6 @@
 //! Where the person is, and whether the views are of one person at one place.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector2, Vector3};
 use vision::{HullOptions, HullView, Rasteriser, Topology, carve_hull};
 
 use crate::{Error, Options, Result, observation::Observation};
@@ -11,6 +11,12 @@ const LEAST_VIEWS: usize = 2;
 const LEAST_ANGLE: f64 = 30.0;
 /// More of an outline than this on the image's border: the view is cut.
 const CUT: f64 = 0.02;
+/// From so many views on, the hull is what all but one see.
+const TOLERANT: usize = 4;
+/// Heights of people, with an arm up or sitting low, metres.
+const HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.5..=2.8;
+/// Heights that may be a person's where nothing is known yet, metres.
+const ROUGH_HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.3..=4.0;
 /// Cells of the hull, metres.
 const CELL_M: f64 = 0.03;
 /// Least share of each silhouette that the hull covers where calibration and silhouettes are right.
@@ -33,34 +39,34 @@ pub struct Place {
 /// Carves the hull of these views.
 pub fn locate(observations: &[Observation], options: &Options) -> Result<Place> {
     check_views(observations)?;
+    // a hull of the wrong unit would be too large to be carved
+    if let Some(height_m) = rough_height(observations).filter(|height| !ROUGH_HEIGHTS_M.contains(height)) {
+        return Err(Error::Height { height_m });
+    }
     let all: Vec<usize> = (0..observations.len()).collect();
     let divided = observations.iter().filter(|view| view.second_region > SECOND);
     let share = divided.clone().map(|view| view.second_region).fold(0.0, f64::max);
     if 3 * divided.count() > observations.len() {
         return Err(Error::TwoPeople { share });
     }
-    let (carved, covered) = carve(observations, &all, 0)?;
-    let Some(carved) = carved else { return Err(Error::ViewsDoNotMeet { explained: 0.0 }) };
-    let explained = covered.iter().sum::<f64>() / covered.len() as f64;
-    if covered.iter().all(|&covered| covered >= COVERED) {
-        return carved.place(all);
-    }
-    if carved.second > SECOND && carved.explained_by_all_pieces(explained) >= COVERED {
+    let Some(carved) = carve(observations)? else { return Err(Error::ViewsDoNotMeet { explained: 0.0 }) };
+    let explained = carved.covered.iter().sum::<f64>() / carved.covered.len() as f64;
+    if carved.second > SECOND && explained * (1.0 + carved.second) >= COVERED {
         return Err(Error::TwoPeople { share: carved.second });
     }
-    if let (Some(without), covered) = carve(observations, &all, 1)?
-        && let Some(bad) = without.left_out
-        && all.iter().zip(&covered).all(|(&view, &covered)| view == bad || covered >= COVERED)
-    {
-        if !options.leave_out_bad_view {
-            return Err(Error::ViewDisagrees { camera: observations[bad].camera.name.clone() });
+    let (kept, bad): (Vec<usize>, Vec<usize>) =
+        all.into_iter().partition(|&view| carved.covered[view] >= COVERED);
+    match bad[..] {
+        [] => {}
+        [view] if kept.len() > LEAST_VIEWS => {
+            if !options.leave_out_bad_view {
+                return Err(Error::ViewDisagrees { camera: observations[view].camera.name.clone() });
+            }
         }
-        return without.place(all.into_iter().filter(|&view| view != bad).collect());
+        _ if explained < LEAST_COVERED => return Err(Error::ViewsDoNotMeet { explained }),
+        _ => return carved.place((0..observations.len()).collect()),
     }
-    if explained < LEAST_COVERED {
-        return Err(Error::ViewsDoNotMeet { explained });
-    }
-    carved.place(all)
+    carved.place(kept)
 }
 
 fn check_views(observations: &[Observation]) -> Result<()> {
@@ -85,17 +91,41 @@ fn check_views(observations: &[Observation]) -> Result<()> {
     Ok(())
 }
 
+/// Median height of the silhouettes at the place that is nearest to all rays through their middles, metres; `None` if the
+/// rays are parallel.
+fn rough_height(observations: &[Observation]) -> Option<f64> {
+    let (mut matrix, mut sum) = (Matrix3::zeros(), Vector3::zeros());
+    for Observation { camera, silhouette, .. } in observations {
+        let [left, top, right, bottom] = silhouette.bounds()?.map(|side| side as f64 / 2.0);
+        let Some(ray) = camera.ray(Vector2::new(left + right, top + bottom)) else { continue };
+        let across = Matrix3::identity() - ray * ray.transpose();
+        matrix += across;
+        sum += across * camera.position();
+    }
+    let middle = matrix.try_inverse()? * sum;
+    let height = |observation: &Observation| {
+        let camera = &observation.camera;
+        let depth = (middle - camera.position()).dot(&camera.direction());
+        let [_, top, _, bottom] = observation.silhouette.bounds()?;
+        Some(depth.abs() * (bottom - top) as f64 / camera.focal.y)
+    };
+    let mut heights: Vec<f64> = observations.iter().filter_map(height).collect();
+    heights.sort_by(f64::total_cmp);
+    heights.get(heights.len() / 2).copied()
+}
+
 struct Carved {
     centroid: Vector3<f64>,
     height_m: f64,
     /// volume of the second piece as a share of the first
     second: f64,
-    left_out: Option<usize>,
+    /// share of each silhouette that the largest piece covers
+    covered: Vec<f64>,
 }
 
 impl Carved {
     fn place(self, kept: Vec<usize>) -> Result<Place> {
-        if !(0.5..2.8).contains(&self.height_m) {
+        if !HEIGHTS_M.contains(&self.height_m) {
             return Err(Error::Height { height_m: self.height_m });
         }
         if self.second > SECOND {
@@ -103,28 +133,20 @@ impl Carved {
         }
         Ok(Place { centroid: self.centroid, kept })
     }
-
-    /// A bound of the share that all pieces cover, from that of the first: the others are as large in the images as in space.
-    fn explained_by_all_pieces(&self, explained: f64) -> f64 {
-        explained * (1.0 + self.second)
-    }
 }
 
-/// The hull, if there is any, and the share of each silhouette that its largest piece covers.
-fn carve(
-    observations: &[Observation],
-    views: &[usize],
-    leave_out: usize,
-) -> Result<(Option<Carved>, Vec<f64>)> {
-    let of_view = |&view: &usize| {
-        let Observation { camera, silhouette, .. } = &observations[view];
-        HullView { camera, silhouette }
-    };
-    let hull_views: Vec<_> = views.iter().map(of_view).collect();
-    let options = HullOptions { cell_m: CELL_M, tolerated: 0, leave_out, ..HullOptions::default() };
-    let hull = match carve_hull(&hull_views, &options) {
+/// The hull, if there is any. Where there are enough views, what all but one see is kept: a hole in one silhouette must not
+/// cut through the body, and a camera that was moved shows by what it sees where nothing is.
+fn carve(observations: &[Observation]) -> Result<Option<Carved>> {
+    let views: Vec<_> = observations
+        .iter()
+        .map(|Observation { camera, silhouette, .. }| HullView { camera, silhouette })
+        .collect();
+    let tolerated = usize::from(observations.len() >= TOLERANT);
+    let options = HullOptions { cell_m: CELL_M, tolerated, leave_out: 0, ..HullOptions::default() };
+    let hull = match carve_hull(&views, &options) {
         Ok(hull) => hull,
-        Err(vision::Error::EmptyHull { .. }) => return Ok((None, vec![0.0; views.len()])),
+        Err(vision::Error::EmptyHull { .. }) => return Ok(None),
         Err(vision::Error::TooManyCells { size_m, .. }) => {
             return Err(Error::Height { height_m: size_m[1] });
         }
@@ -132,8 +154,8 @@ fn carve(
     };
     let topology = Topology::new(&hull.mesh.faces, hull.mesh.vertices.len());
     let mut rasteriser = Rasteriser::new();
-    let covered = views.iter().map(|&view| {
-        let (view, observed) = &observations[view].scoring;
+    let covered = observations.iter().map(|observation| {
+        let (view, observed) = &observation.scoring;
         let mut drawn = model::Silhouette::empty(view.size[0], view.size[1]);
         rasteriser.silhouette(view, &hull.mesh.vertices, &topology, &mut drawn);
         let both = drawn.words().iter().zip(observed.silhouette().words());
@@ -144,13 +166,12 @@ fn carve(
     let heights = hull.mesh.vertices.iter().map(|vertex| vertex.y);
     let [low, high] =
         heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)]);
-    let carved = Carved {
+    Ok(Some(Carved {
         centroid: centroid(&hull.mesh.vertices, &hull.mesh.faces),
         height_m: high - low,
         second: hull.pieces_m3.get(1).map_or(0.0, |second| second / hull.pieces_m3[0]),
-        left_out: hull.agreement.iter().position(|view| view.is_left_out).map(|at| views[at]),
-    };
-    Ok((Some(carved), covered))
+        covered,
+    }))
 }
 
 /// Centre of the volume of a closed mesh, metres.
