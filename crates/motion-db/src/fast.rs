@@ -18,7 +18,7 @@ struct Effort {
 /// Starting from nothing. Measured: see docs/motion-database.md.
 const GLOBAL: Effort = Effort { lists: 96, segments: 500 };
 /// Starting from the last matches.
-const TRACKING: Effort = Effort { lists: 20, segments: 320 };
+const TRACKING: Effort = Effort { lists: 14, segments: 260 };
 /// The same for a query that is like nothing in the database: its neighbours are far away and spread out.
 const STRANGE_GLOBAL: Effort = Effort { lists: 256, segments: 1_000 };
 const STRANGE_TRACKING: Effort = Effort { lists: 128, segments: 700 };

@@ -20,6 +20,104 @@ pub struct StartPose {
 /// Two starts of the same clip nearer than this (frames) are one.
 pub(crate) const DISTINCT_FRAMES: usize = 6;
 
+/// Where control points were over the frames of a start. Sums that do not depend on the database's poses are taken once.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Observation {
+    samples: Vec<Sample>,
+    /// sums of x and of z, metres
+    sum: [f64; 2],
+    /// sum of x² + z², metres²
+    squares: f64,
+}
+
+/// One point that was measured in one frame.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    /// frames after the oldest one observed
+    offset: usize,
+    point: usize,
+    /// metres, world
+    position: [f64; 3],
+}
+
+/// Sums over the samples from which turn, shift and error follow, metres and metres².
+struct Sums {
+    own: [f64; 2],
+    squares: f64,
+    dot: f64,
+    cross: f64,
+}
+
+impl Observation {
+    /// Room for so many samples.
+    pub fn with_capacity(samples: usize) -> Self {
+        Self { samples: Vec::with_capacity(samples), ..Self::default() }
+    }
+
+    /// Forgets what was observed.
+    pub fn clear(&mut self) {
+        self.samples.clear();
+        (self.sum, self.squares) = ([0.0; 2], 0.0);
+    }
+
+    /// Adds what was measured `offset` frames after the oldest frame; `None` where nothing was. Shape `[points]`.
+    pub fn add(&mut self, offset: usize, positions: impl Iterator<Item = Option<Vector3<f64>>>) {
+        for (point, position) in positions.enumerate() {
+            let Some(p) = position else { continue };
+            self.samples.push(Sample { offset, point, position: p.into() });
+            self.sum[0] += p.x;
+            self.sum[1] += p.z;
+            self.squares += p.x * p.x + p.z * p.z;
+        }
+    }
+
+    /// How many points were measured, summed over the frames.
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    #[inline]
+    fn sums(&self, table: &ControlTable, pose: usize) -> Sums {
+        let mut sums = Sums { own: [0.0; 2], squares: 0.0, dot: 0.0, cross: 0.0 };
+        for sample in &self.samples {
+            let [ax, ay, az] = table.world(pose + sample.offset)[sample.point].map(f64::from);
+            let [bx, by, bz] = sample.position;
+            sums.own[0] += ax;
+            sums.own[1] += az;
+            sums.squares += ax * ax + az * az + (ay - by) * (ay - by);
+            sums.dot += ax * bx + az * bz;
+            sums.cross += az * bx - ax * bz;
+        }
+        let each = 1.0 / self.len() as f64;
+        let [x, z] = sums.own;
+        let [bx, bz] = self.sum;
+        sums.squares += self.squares - each * (x * x + z * z + bx * bx + bz * bz);
+        sums.dot -= each * (x * bx + z * bz);
+        sums.cross -= each * (z * bx - x * bz);
+        sums
+    }
+
+    /// Mean squared distance of the points of a pose from those observed, after the best turn about y and shift on the
+    /// floor, metres²: Procrustes in the plane, heights compared as they are. Needs two samples.
+    pub fn misfit(&self, table: &ControlTable, pose: usize) -> f64 {
+        let sums = self.sums(table, pose);
+        let both = (sums.dot * sums.dot + sums.cross * sums.cross).sqrt();
+        (sums.squares - 2.0 * both).max(0.0) / self.len() as f64
+    }
+
+    /// The best turn and shift of a pose. `distance` is stated as it is given.
+    pub fn place(&self, table: &ControlTable, pose: usize, distance: f64) -> StartPose {
+        let sums = self.sums(table, pose);
+        let each = 1.0 / self.len() as f64;
+        // world = R_y(turn) a + shift with R_y: x' = c x + s z, z' = −s x + c z.
+        let turn = sums.cross.atan2(sums.dot);
+        let (sin, cos) = turn.sin_cos();
+        let [x, z] = sums.own.map(|sum| sum * each);
+        let shift = [self.sum[0] * each - cos * x - sin * z, self.sum[1] * each + sin * x - cos * z];
+        StartPose { pose, turn, shift, distance }
+    }
+}
+
 /// Finds the database poses from which the session may have started (method §2, mend 8): those whose control points
 /// over the frames `offsets` fit the observed ones best, after the best turn about y and shift on the floor.
 ///
@@ -41,76 +139,40 @@ pub fn start_poses(
     exclude: &[Range<usize>],
     count: usize,
 ) -> Vec<StartPose> {
-    let last = offsets.iter().copied().max().unwrap_or(0);
-    let mut all = Vec::new();
-    for (index, clip) in database.clips().iter().enumerate() {
-        let unlike = skeleton_weight * table.unlikeness(index) / 100.0;
-        let end = (clip.first_pose + clip.num_poses).saturating_sub(last);
-        for pose in clip.first_pose + history..end {
-            if exclude.iter().any(|r| r.contains(&pose)) {
-                continue;
-            }
-            if let Some(start) = fit(table, pose, offsets, observed) {
-                all.push(StartPose { distance: start.distance.hypot(unlike), ..start });
-            }
-        }
+    let mut observation = Observation::with_capacity(observed.len());
+    for (offset, positions) in offsets.iter().zip(observed.chunks(table.num_points())) {
+        observation.add(*offset, positions.iter().copied());
     }
-    all.sort_by(|a, b| a.distance.total_cmp(&b.distance).then(a.pose.cmp(&b.pose)));
-    let mut chosen: Vec<StartPose> = Vec::new();
-    for start in all {
+    if observation.len() < 2 {
+        return Vec::new();
+    }
+    let last = offsets.iter().copied().max().unwrap_or(0);
+    let mut all: Vec<(f64, usize)> = Vec::with_capacity(database.num_poses());
+    for (index, clip) in database.clips().iter().enumerate() {
+        let unlike = (skeleton_weight * table.unlikeness(index) / 100.0).powi(2);
+        let end = (clip.first_pose + clip.num_poses).saturating_sub(last);
+        let poses = (clip.first_pose + history..end).filter(|pose| !exclude.iter().any(|r| r.contains(pose)));
+        all.extend(poses.map(|pose| (observation.misfit(table, pose) + unlike, pose)));
+    }
+    // Each pose chosen rules out so many others at most: the rest need not be sorted.
+    let enough = count * (2 * DISTINCT_FRAMES + 1);
+    let best_first = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    if enough < all.len() {
+        all.select_nth_unstable_by(enough, best_first);
+        all.truncate(enough);
+    }
+    all.sort_unstable_by(best_first);
+    let mut chosen: Vec<StartPose> = Vec::with_capacity(count);
+    for (squared, pose) in all {
         if chosen.len() == count {
             break;
         }
         let is_distinct = |c: &StartPose| {
-            c.pose.abs_diff(start.pose) > DISTINCT_FRAMES
-                || database.clip_of(c.pose) != database.clip_of(start.pose)
+            c.pose.abs_diff(pose) > DISTINCT_FRAMES || database.clip_of(c.pose) != database.clip_of(pose)
         };
         if chosen.iter().all(is_distinct) {
-            chosen.push(start);
+            chosen.push(observation.place(table, pose, squared.sqrt()));
         }
     }
     chosen
-}
-
-/// Best turn and shift of one pose: Procrustes in the plane, heights compared as they are.
-pub(crate) fn fit(
-    table: &ControlTable,
-    pose: usize,
-    offsets: &[usize],
-    observed: &[Option<Vector3<f64>>],
-) -> Option<StartPose> {
-    let points = table.num_points();
-    let mut count = 0.0;
-    let (mut mean_a, mut mean_b) = ([0.0; 2], [0.0; 2]);
-    let (mut squares, mut dot, mut cross) = (0.0, 0.0, 0.0);
-    for (step, &offset) in offsets.iter().enumerate() {
-        for (point, a) in table.world(pose + offset).iter().enumerate() {
-            let Some(b) = observed[step * points + point] else { continue };
-            let (ax, ay, az) = (f64::from(a[0]), f64::from(a[1]), f64::from(a[2]));
-            count += 1.0;
-            mean_a[0] += ax;
-            mean_a[1] += az;
-            mean_b[0] += b.x;
-            mean_b[1] += b.z;
-            squares += ax * ax + az * az + b.x * b.x + b.z * b.z + (ay - b.y).powi(2);
-            dot += ax * b.x + az * b.z;
-            cross += az * b.x - ax * b.z;
-        }
-    }
-    if count < 2.0 {
-        return None;
-    }
-    for v in mean_a.iter_mut().chain(&mut mean_b) {
-        *v /= count;
-    }
-    squares -= count * (mean_a[0].powi(2) + mean_a[1].powi(2) + mean_b[0].powi(2) + mean_b[1].powi(2));
-    dot -= count * (mean_a[0] * mean_b[0] + mean_a[1] * mean_b[1]);
-    cross -= count * (mean_a[1] * mean_b[0] - mean_a[0] * mean_b[1]);
-    // world = R_y(turn) a + shift with R_y: x' = c x + s z, z' = −s x + c z.
-    let turn = cross.atan2(dot);
-    let (sin, cos) = turn.sin_cos();
-    let error = (squares - 2.0 * dot.hypot(cross)).max(0.0);
-    let shift =
-        [mean_b[0] - cos * mean_a[0] - sin * mean_a[1], mean_b[1] + sin * mean_a[0] - cos * mean_a[1]];
-    Some(StartPose { pose, turn, shift, distance: (error / count).sqrt() })
 }

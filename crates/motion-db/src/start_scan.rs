@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use crate::start::{DISTINCT_FRAMES, fit};
+use crate::start::{DISTINCT_FRAMES, Observation};
 use crate::{ControlTable, MotionDatabase, StartPose};
 
 /// Poses of a clip that are looked at in the first pass: every fourth. Neighbouring poses are nearly the same.
@@ -16,14 +16,12 @@ const KEPT: usize = 32;
 /// Takes no memory once made.
 #[derive(Debug, Clone)]
 pub struct StartScan {
-    points: usize,
     /// frames before the pose in its clip
     history: usize,
     skeleton_weight: f64,
-    /// frames after the oldest one observed, rising from 0
-    offsets: Vec<usize>,
-    /// shape `[offsets, points]`
-    observed: Vec<Option<Vector3<f64>>>,
+    observation: Observation,
+    /// frames from the oldest to the newest observed
+    span: usize,
     clip: usize,
     pose: usize,
     /// best first; their `pose` is the one of the oldest frame observed
@@ -35,11 +33,10 @@ impl StartScan {
     /// pose in its clip; `skeleton_weight`: as for [`crate::start_poses`].
     pub fn new(points: usize, frames: usize, history: usize, skeleton_weight: f64) -> Self {
         Self {
-            points,
             history,
             skeleton_weight,
-            offsets: Vec::with_capacity(frames),
-            observed: Vec::with_capacity(frames * points),
+            observation: Observation::with_capacity(frames * points),
+            span: 0,
             clip: 0,
             pose: 0,
             best: Vec::with_capacity(KEPT + 1),
@@ -55,15 +52,15 @@ impl StartScan {
 
     /// Forgets what was observed, not what was found.
     pub fn forget(&mut self) {
-        self.offsets.clear();
-        self.observed.clear();
+        self.observation.clear();
+        self.span = 0;
     }
 
     /// Adds what was observed `offset` frames after the oldest frame observed, oldest first: positions (metres, world; NaN
     /// where not measured), shape `[points]`.
     pub fn observe(&mut self, offset: usize, positions: &[Vector3<f64>]) {
-        self.offsets.push(offset);
-        self.observed.extend(positions.iter().map(|p| p.x.is_finite().then_some(*p)));
+        self.observation.add(offset, positions.iter().map(|p| p.x.is_finite().then_some(*p)));
+        self.span = offset;
     }
 
     /// Looks further, at most at about `work` samples (poses × frames × points); `true` when all was looked at.
@@ -74,7 +71,10 @@ impl StartScan {
         exclude: &[Range<usize>],
         work: usize,
     ) -> bool {
-        let mut left = (work / (self.offsets.len() * self.points).max(1)).max(1);
+        if self.observation.len() < 2 {
+            return true;
+        }
+        let mut left = (work / self.observation.len()).max(1);
         let clips = database.clips();
         while let Some(clip) = clips.get(self.clip) {
             let range = self.range(clip.first_pose..clip.first_pose + clip.num_poses);
@@ -85,10 +85,8 @@ impl StartScan {
                     return false;
                 }
                 left -= 1;
-                if !exclude.iter().any(|r| r.contains(&self.pose))
-                    && let Some(start) = fit(table, self.pose, &self.offsets, &self.observed)
-                {
-                    self.keep(StartPose { distance: start.distance.hypot(unlike), ..start });
+                if !exclude.iter().any(|r| r.contains(&self.pose)) {
+                    self.keep(table, self.pose, unlike);
                 }
                 self.pose += STRIDE;
             }
@@ -114,6 +112,7 @@ impl StartScan {
             *place = start.pose;
         }
         self.best.clear();
+        let count = if self.observation.len() < 2 { 0 } else { count };
         for &place in &places[..count] {
             let index = database.clip_of(place);
             let clip = &database.clips()[index];
@@ -121,10 +120,8 @@ impl StartScan {
             let unlike = self.unlikeness(table, index);
             let near = (place + later).saturating_sub(STRIDE - 1)..place + later + STRIDE;
             for pose in near.filter(|p| range.contains(p)) {
-                if !exclude.iter().any(|r| r.contains(&pose))
-                    && let Some(start) = fit(table, pose, &self.offsets, &self.observed)
-                {
-                    self.keep(StartPose { distance: start.distance.hypot(unlike), ..start });
+                if !exclude.iter().any(|r| r.contains(&pose)) {
+                    self.keep(table, pose, unlike);
                 }
             }
         }
@@ -142,27 +139,29 @@ impl StartScan {
 
     /// Frames from the oldest to the newest observed.
     pub fn span(&self) -> usize {
-        self.offsets.last().copied().unwrap_or(0)
+        self.span
     }
 
+    /// What the unlikeness of a clip's skeleton adds to the squared distance, metres².
     fn unlikeness(&self, table: &ControlTable, clip: usize) -> f64 {
-        self.skeleton_weight * table.unlikeness(clip) / 100.0
+        (self.skeleton_weight * table.unlikeness(clip) / 100.0).powi(2)
     }
 
     /// Keeps a place if it is among the best and better than those beside it.
-    fn keep(&mut self, start: StartPose) {
-        let is_worse = |s: &StartPose| s.distance > start.distance;
+    fn keep(&mut self, table: &ControlTable, pose: usize, unlikeness: f64) {
+        let distance = (self.observation.misfit(table, pose) + unlikeness).sqrt();
+        let is_worse = |s: &StartPose| s.distance > distance;
         if self.best.len() == KEPT && !self.best.last().is_some_and(is_worse) {
             return;
         }
-        if let Some(beside) = self.best.iter().position(|s| s.pose.abs_diff(start.pose) <= DISTINCT_FRAMES) {
+        if let Some(beside) = self.best.iter().position(|s| s.pose.abs_diff(pose) <= DISTINCT_FRAMES) {
             if !is_worse(&self.best[beside]) {
                 return;
             }
             self.best.remove(beside);
         }
-        let at = self.best.partition_point(|s| s.distance <= start.distance);
-        self.best.insert(at, start);
+        let at = self.best.partition_point(|s| s.distance <= distance);
+        self.best.insert(at, self.observation.place(table, pose, distance));
         self.best.truncate(KEPT);
     }
 }

@@ -72,9 +72,9 @@ pub enum Covariance {
 #[serde(rename_all = "kebab-case")]
 pub enum Search {
     /// all of them: every window is considered
-    #[default]
     Exact,
-    /// nearly all of them, along the neighbour graph from those of the frame before: for large databases
+    /// nearly all of them, along the neighbour graph from those of the frame before
+    #[default]
     Fast,
 }
 

@@ -2,7 +2,7 @@
 /// are as uncertain as they are, and uncertainty grows over a gap (tuned on every third trial of five-actions).
 const RETAINED: f64 = 0.98;
 /// What the model leaves out: neighbours that are all alike, points that hang from a skeleton (tuned likewise).
-const SCALE: f64 = 0.75;
+const SCALE: f64 = 0.68;
 
 /// Variance of every coordinate, carried from frame to frame.
 ///
@@ -49,7 +49,7 @@ impl Uncertainty {
             let left = (*sigma * *sigma / own).min(1.0);
             let before = if self.is_new { own / (1.0 - RETAINED * RETAINED) } else { self.variances[d] };
             self.variances[d] = left * (RETAINED * RETAINED * before + own);
-            *sigma = SCALE * (self.variances[d] + self.constant[d]).sqrt();
+            *sigma = (SCALE * SCALE * self.variances[d] + self.constant[d]).sqrt();
         }
         self.is_new = false;
     }
