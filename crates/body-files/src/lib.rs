@@ -17,12 +17,14 @@ mod error;
 mod glb;
 mod meshes;
 mod scans;
+mod shipped;
 mod tables;
 mod template;
 
 pub use error::Error;
 pub use glb::{Poses, glb};
 pub use scans::{ScanOptions, ScanSet, is_used};
+pub use shipped::{Shipped, shipped};
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

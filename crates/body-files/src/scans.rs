@@ -119,7 +119,7 @@ impl ScanSet {
             skin_joints: one(Use::SkinJoints)?,
             skin_weights: one(Use::SkinWeights)?,
         };
-        let template = template(rest, faces, &rig, &mut warnings)?;
+        let template = template(&rest, &faces, &rig, &mut warnings)?;
         let people = tables::subjects(one(Use::Subjects)?)?;
         let subjects = scans.iter().map(|s| people.get(&s.subject).copied().unwrap_or_default()).collect();
         Ok(Self { template, scans, subjects, warnings })

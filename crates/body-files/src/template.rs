@@ -1,6 +1,6 @@
 //! What all scans have in common: a rig and a skin, given with the scans or those of the shipped model.
 
-use body::{BodyModel, JointRegressor, Rig, RigFile, Skin, Template, heat_skin};
+use body::{RigFile, Skin, Template, TemplateParts};
 use formats::archive::Entry;
 use nalgebra::Vector3;
 
@@ -14,71 +14,30 @@ pub(crate) struct RigEntries<'a> {
     pub skin_weights: Option<&'a Entry>,
 }
 
-/// Puts a template together from a mesh and what came with it.
+/// Puts a template together from a mesh and what came with it; says what had to be computed.
 pub(crate) fn template(
-    rest: Vec<Vector3<f64>>,
-    faces: Vec<[u32; 3]>,
+    rest: &[Vector3<f64>],
+    faces: &[[u32; 3]],
     entries: &RigEntries<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Template> {
-    let Some(entry) = entries.rig else { return of_shipped(rest, faces) };
-    let in_rig = Error::in_rig(&entry.name);
-    let file = RigFile::parse(&entry.bytes).map_err(&in_rig)?;
-    let rig = file.rig().map_err(&in_rig)?;
-    let Some(regressor) = file.regressor(rest.len()).map_err(&in_rig)? else {
-        return Err(Error::content(
-            &entry.name,
-            "no joint_regressor",
-            "for every joint the vertices and weights that its position follows from",
-        ));
-    };
+    let parse = |entry: &Entry| RigFile::parse(&entry.bytes).map_err(Error::in_rig(&entry.name));
+    let rig = entries.rig.map(parse).transpose()?;
     let skin = match (entries.skin_joints, entries.skin_weights) {
-        (Some(joints), Some(weights)) => given_skin(joints, weights, &rig)?,
-        _ => {
-            warnings.push(
-                "no skin_joints.npy and skin_weights.npy: weights were computed by heat from the bones"
-                    .into(),
-            );
-            computed_skin(&rest, &faces, &rig, &regressor)?
-        }
+        (Some(joints), Some(weights)) => Some(given_skin(joints, weights)?),
+        _ => None,
     };
-    Ok(Template { faces, rest, rig, regressor, skin })
-}
-
-/// Rig and skin of the shipped model, for meshes of its topology.
-fn of_shipped(rest: Vec<Vector3<f64>>, faces: Vec<[u32; 3]>) -> Result<Template> {
-    let shipped = BodyModel::shipped();
-    if rest.len() != shipped.num_vertices() || faces.len() != shipped.faces().len() {
-        return Err(Error::Set {
-            found: format!("no rig.json, and a mesh of {} vertices and {} faces", rest.len(), faces.len()),
-            expected: format!(
-                "a rig.json with joints, joint_regressor and dofs, or the topology of the shipped model ({} vertices, {} \
-                 faces)",
-                shipped.num_vertices(),
-                shipped.faces().len()
-            ),
-        });
+    if rig.is_some() && skin.is_none() {
+        warnings.push(
+            "no skin_joints.npy and skin_weights.npy: weights were computed by heat from the bones".into(),
+        );
     }
-    Ok(Template {
-        faces,
-        rest,
-        rig: shipped.rig().clone(),
-        regressor: shipped.regressor().clone(),
-        skin: shipped.skin().clone(),
-    })
-}
-
-fn computed_skin(
-    rest: &[Vector3<f64>],
-    faces: &[[u32; 3]],
-    rig: &Rig,
-    regressor: &JointRegressor,
-) -> Result<Skin> {
-    Ok(heat_skin(rest, faces, rig, &regressor.joints(rest))?)
+    let parts = TemplateParts { faces, rest, rig: rig.as_ref(), skin: skin.as_ref(), known_joints: &[] };
+    Ok(Template::new(parts)?)
 }
 
 /// A skin from two arrays of shape `[vertices, 4]`.
-fn given_skin(joints: &Entry, weights: &Entry, rig: &Rig) -> Result<Skin> {
+fn given_skin(joints: &Entry, weights: &Entry) -> Result<Skin> {
     let of = |entry: &Entry| -> Result<Vec<[f64; 4]>> {
         let array = formats::npy::read(&entry.bytes).map_err(Error::in_file(&entry.name))?;
         match array.shape[..] {
@@ -97,5 +56,6 @@ fn given_skin(joints: &Entry, weights: &Entry, rig: &Rig) -> Result<Skin> {
     // checked just now; a cast saturates
     let indices: Vec<[u8; 4]> = indices.iter().map(|row| row.map(|j| j as u8)).collect();
     let shares: Vec<[f32; 4]> = shares.iter().map(|row| row.map(|w| w as f32)).collect();
-    Skin::new(&indices, &shares, rig.num_joints()).map_err(Error::in_rig(&weights.name))
+    let num_joints = indices.iter().flatten().max().map_or(0, |last| usize::from(*last) + 1);
+    Skin::new(&indices, &shares, num_joints).map_err(Error::in_rig(&weights.name))
 }

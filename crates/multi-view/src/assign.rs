@@ -32,7 +32,7 @@ pub struct Assigned {
 }
 
 /// Finds the camera of every name: that of `map`, else the camera of the same name (but for case, signs, and words such as
-/// `plate`), else the only one with the same number in its name.
+/// `plate`), else the only one with the same number in its name. Names may have folders: the last that tells counts.
 ///
 /// # Errors
 /// [`Error::Camera`] for a name that leads to none or several, [`Error::Twice`] for a camera with two, [`Error::Map`] for an
@@ -70,25 +70,32 @@ fn check_map(names: &[String], cameras: &[String], map: &BTreeMap<String, String
 }
 
 fn by_name(name: &str, cameras: &[String]) -> Result<usize> {
+    let mut several = Vec::new();
+    for part in name.rsplit('/').filter(|part| !part.is_empty()) {
+        match candidates(part, cameras)[..] {
+            [] => {}
+            [camera] => return Ok(camera),
+            [..] if !several.is_empty() => {}
+            ref found => several = found.iter().map(|&camera| cameras[camera].clone()).collect(),
+        }
+    }
+    let found = if several.is_empty() {
+        "no camera".to_owned()
+    } else {
+        format!("several cameras ({})", listed(&several))
+    };
+    Err(Error::Camera { source_name: name.to_owned(), found, cameras: listed(cameras) })
+}
+
+/// Cameras that a name may mean.
+fn candidates(name: &str, cameras: &[String]) -> Vec<usize> {
     let own = words(name);
     let all = |is: &dyn Fn(&Words) -> bool| -> Vec<usize> {
         (0..cameras.len()).filter(|&camera| is(&words(&cameras[camera]))).collect()
     };
-    let mut found = all(&|camera| camera.letters == own.letters);
-    if found.is_empty() {
-        found = all(&|camera| camera.number.is_some() && camera.number == own.number);
-    }
-    match found[..] {
-        [camera] => Ok(camera),
-        _ => {
-            let several: Vec<String> = found.iter().map(|&camera| cameras[camera].clone()).collect();
-            let found = if several.is_empty() {
-                "no camera".into()
-            } else {
-                format!("several cameras ({})", listed(&several))
-            };
-            Err(Error::Camera { source_name: name.to_owned(), found, cameras: listed(cameras) })
-        }
+    match all(&|camera| camera.letters == own.letters) {
+        found if !found.is_empty() => found,
+        _ => all(&|camera| camera.number.is_some() && camera.number == own.number),
     }
 }
 
@@ -102,8 +109,7 @@ struct Words {
 }
 
 fn words(name: &str) -> Words {
-    let file = name.trim_end_matches('/').rsplit('/').next().unwrap_or(name);
-    let stem = file.split_once('.').map_or(file, |(stem, _)| stem);
+    let stem = name.split_once('.').map_or(name, |(stem, _)| stem);
     // `cam01` is two words
     let mut parts: Vec<String> = Vec::new();
     let mut last = None;
@@ -152,6 +158,7 @@ mod tests {
         assert_eq!(found(&["camera_3.mp4"], &["int_cam1_img", "int_cam3_img"]), Ok(vec![1]));
         assert_eq!(found(&["left.mp4"], &["Left", "right"]), Ok(vec![0]));
         assert_eq!(found(&["take3_cam2.mp4"], &["cam1", "cam2", "cam3"]), Ok(vec![1]));
+        assert_eq!(found(&["all.zip/cam2/masks", "cam1.zip/frames"], &["cam1", "cam2"]), Ok(vec![1, 0]));
     }
 
     #[test]

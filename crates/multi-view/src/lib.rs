@@ -4,7 +4,6 @@
 //! - [`CameraRecord`]: a camera as jobs hand it on, to the bit.
 //! - [`SilhouetteClip`], [`ClipWriter`]: a stretch of silhouettes in a few kilobytes a second.
 //! - [`Parameters`]: all that decides the result.
-//! - [`draw_outline`]: a silhouette's outline over a picture.
 //!
 //! ```
 //! use model::Silhouette;
@@ -23,14 +22,12 @@ mod assign;
 mod camera;
 mod clip;
 mod error;
-mod outline;
 mod parameters;
 
 pub use assign::{Assigned, assign};
 pub use camera::CameraRecord;
 pub use clip::{ClipWriter, SilhouetteClip};
 pub use error::Error;
-pub use outline::draw_outline;
 pub use parameters::Parameters;
 
 /// Result of this crate.

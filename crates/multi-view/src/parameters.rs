@@ -16,6 +16,10 @@ pub struct Parameters {
     pub shape_step: usize,
     /// videos whose longer side has more pixels are read smaller
     pub largest_side: u32,
+    /// a view that disagrees with all others is left out, rather than ending the run
+    pub leave_out_bad_view: bool,
+    /// a body that covers less of the silhouettes (mean intersection over union) is a failure
+    pub least_overlap: f64,
     /// width of the smallest cubes of the visual hull, metres
     pub hull_voxel_m: f64,
     /// how silhouettes are told from the background
@@ -30,6 +34,8 @@ impl Default for Parameters {
             shape_frames: 1,
             shape_step: 10,
             largest_side: 2048,
+            leave_out_bad_view: true,
+            least_overlap: 0.72,
             hull_voxel_m: 0.01,
             background: background::Parameters::default(),
         }
@@ -57,6 +63,10 @@ impl Parameters {
         if !(0.002..=0.1).contains(&self.hull_voxel_m) {
             let found = self.hull_voxel_m.to_string();
             return Err(Error::Parameter { name: "hull_voxel_m", found, expected: "0.002 to 0.1 metres" });
+        }
+        if !(0.3..=1.0).contains(&self.least_overlap) {
+            let found = self.least_overlap.to_string();
+            return Err(Error::Parameter { name: "least_overlap", found, expected: "0.3 to 1" });
         }
         Ok(self.background.check()?)
     }

@@ -4,9 +4,13 @@
 //! uploaded, built or deleted after it was asked for. The same JSON is the run's `parameters`, which the user sees.
 
 mod augment;
+mod body_model;
+mod cameras;
 mod database;
 
 pub use augment::{Augment, Error};
+pub use body_model::{BUILD_BODY_MODEL, BodyModelFile, BodyModelName, BuildBodyModel, SHIPPED};
+pub use cameras::{PLAN_MULTI_VIEW, PlanMultiView};
 pub use database::{
     MotionDatabaseFile, MotionDatabaseName, PLAN_MOTION_DATABASE, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm,
 };
@@ -18,7 +22,7 @@ use serde::{Deserialize, Serialize};
 pub struct InputFile {
     /// Name given by the user.
     pub name: String,
-    /// `skeleton`, `control-points`, `ground-truth` or `motion`.
+    /// `skeleton`, `control-points`, `ground-truth`, `motion`, `scans`, `calibration`, `video`, `images`, `masks` or `plate`.
     #[serde(default)]
     pub role: String,
     /// Where it is in the object store.
@@ -36,4 +40,17 @@ pub struct Object {
     pub store_key: String,
     /// BLAKE3 of the content, hex.
     pub blake3: String,
+}
+
+/// Who did a job, and how long it took. Goes to `run.json`, never into a motion or a body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JobReport {
+    /// The worker process.
+    pub worker: String,
+    /// Which attempt it was, from 1.
+    pub attempt: i32,
+    /// Time it took, seconds.
+    pub seconds: f64,
+    /// Frames that it computed.
+    pub frames: usize,
 }

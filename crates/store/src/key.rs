@@ -5,6 +5,8 @@
 //! runs/{run}/{job}/{lease}/{name}                  an artefact or result of a job
 //! motion-databases/{database}/inputs/{file}        an upload for a motion database
 //! motion-databases/{database}/{job}/{lease}/{name} an index file, list of them or model that a job made
+//! body-models/{model}/inputs/{file}                an upload for a body model
+//! body-models/{model}/{job}/{lease}/{name}         a body model that a job made
 //! ```
 //!
 //! What jobs write contains the lease number of the claim that wrote it, so a worker that lost its lease
@@ -88,6 +90,24 @@ pub fn motion_database_job_prefix(database: Uuid, job: i64) -> Key {
     Key(format!("motion-databases/{database}/{job}"))
 }
 
+/// An uploaded file that a body model is to be learned from.
+pub fn body_model_input(model: Uuid, file: Uuid) -> Key {
+    Key(format!("body-models/{model}/inputs/{file}"))
+}
+
+/// The file of a body model, which `job` writes under lease number `lease`.
+///
+/// # Errors
+/// [`Error::BadKey`] if `name` is not a plain file name.
+pub fn body_model(model: Uuid, job: i64, lease: i64, name: &str) -> Result<Key, Error> {
+    under(&format!("body-models/{model}/{job}/{lease}"), name)
+}
+
+/// Prefix of everything that one job wrote for a body model.
+pub fn body_model_job_prefix(model: Uuid, job: i64) -> Key {
+    Key(format!("body-models/{model}/{job}"))
+}
+
 /// An artefact that `job` of `run` writes under lease number `lease`.
 ///
 /// # Errors
@@ -121,6 +141,11 @@ pub fn session_prefix(project: Uuid, session: Uuid) -> Key {
 /// Prefix of everything of a motion database.
 pub fn motion_database_prefix(database: Uuid) -> Key {
     Key(format!("motion-databases/{database}"))
+}
+
+/// Prefix of everything of a body model.
+pub fn body_model_prefix(model: Uuid) -> Key {
+    Key(format!("body-models/{model}"))
 }
 
 #[cfg(test)]

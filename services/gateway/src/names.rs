@@ -30,8 +30,8 @@ pub(crate) fn check_file_name(name: &str) -> Result<()> {
     Ok(())
 }
 
-/// Checks the name of a motion database: letters, digits, `.`, `_` and `-`, so that it can be part of a path.
-pub(crate) fn check_database_name(name: &str) -> Result<()> {
+/// Checks the name of a motion database or body model: letters, digits, `.`, `_` and `-`, so that it can be part of a path.
+pub(crate) fn check_versioned_name(what: &str, name: &str) -> Result<()> {
     let good = (1..=64).contains(&name.len())
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
         && name.as_bytes()[0].is_ascii_alphanumeric()
@@ -39,7 +39,7 @@ pub(crate) fn check_database_name(name: &str) -> Result<()> {
         && uuid::Uuid::parse_str(name).is_err();
     if !good {
         return Err(Error::Unprocessable(format!(
-            "motion database name {:?} is not one: expected 1 to 64 letters, digits, '.', '_' or '-', beginning with \
+            "{what} name {:?} is not one: expected 1 to 64 letters, digits, '.', '_' or '-', beginning with \
              a letter or digit",
             name.chars().take(80).collect::<String>()
         )));
@@ -59,6 +59,18 @@ pub(crate) enum FileRole {
     GroundTruth,
     /// motion to build a database from: archives, ASF and AMC, BVH
     Motion,
+    /// scans to learn a body model from: archives, OBJ, PLY, NPY, their rig and tables
+    Scans,
+    /// calibrated cameras: TOML, YAML, JSON, XML, Qualisys
+    Calibration,
+    /// what a camera recorded
+    Video,
+    /// the same as an archive of pictures
+    Images,
+    /// an archive of silhouettes
+    Masks,
+    /// a picture of the empty scene, or an archive of such
+    Plate,
 }
 
 impl FileRole {
@@ -68,6 +80,12 @@ impl FileRole {
             Self::ControlPoints => "control-points",
             Self::GroundTruth => "ground-truth",
             Self::Motion => "motion",
+            Self::Scans => "scans",
+            Self::Calibration => "calibration",
+            Self::Video => "video",
+            Self::Images => "images",
+            Self::Masks => "masks",
+            Self::Plate => "plate",
         }
     }
 
@@ -77,6 +95,20 @@ impl FileRole {
             "asf" => Some(Self::Skeleton),
             "csv" | "trc" | "c3d" => Some(Self::ControlPoints),
             "amc" | "bvh" => Some(Self::GroundTruth),
+            "toml" | "json" | "yml" | "yaml" | "xml" | "qca.txt" => Some(Self::Calibration),
+            "mp4" | "mov" | "m4v" | "avi" | "mkv" | "webm" => Some(Self::Video),
+            "png" | "jpg" | "jpeg" => Some(Self::Plate),
+            "zip" | "tar" | "tgz" | "tzst" => {
+                let lower = name.to_ascii_lowercase();
+                let tells = |words: &[&str]| words.iter().any(|word| lower.contains(word));
+                if tells(&["plate", "background"]) {
+                    Some(Self::Plate)
+                } else if tells(&["image", "frame", "photo", "rgb"]) {
+                    Some(Self::Images)
+                } else {
+                    Some(Self::Masks)
+                }
+            }
             _ => None,
         }
     }
@@ -88,18 +120,31 @@ impl FileRole {
             (Self::Skeleton, Some("asf" | "bvh"))
                 | (Self::ControlPoints, Some("csv" | "trc" | "c3d"))
                 | (Self::GroundTruth, Some("amc" | "bvh"))
+                | (Self::Calibration, Some("toml" | "json" | "yml" | "yaml" | "xml" | "qca.txt"))
+                | (Self::Video, Some("mp4" | "mov" | "m4v" | "avi" | "mkv" | "webm"))
+                | (Self::Images | Self::Masks | Self::Plate, Some("zip" | "tar" | "tgz" | "tzst"))
+                | (Self::Plate, Some("png" | "jpg" | "jpeg"))
         )
     }
 
     /// Whether motion databases are built from files of that name.
     pub fn is_motion_file(name: &str) -> bool {
-        kind(name).is_some() && !matches!(kind(name), Some("csv" | "trc" | "c3d"))
+        matches!(kind(name), Some("asf" | "amc" | "bvh" | "zip" | "tar" | "tgz" | "tzst"))
+    }
+
+    /// Whether body models are learned from files of that name.
+    pub fn is_scan_file(name: &str) -> bool {
+        matches!(kind(name), Some("obj" | "ply" | "npy" | "json" | "csv" | "zip" | "tar" | "tgz" | "tzst"))
     }
 }
 
 /// The kind of file that a name stands for: its extension in lower case, without `.zst` or `.gz` behind it.
 fn kind(name: &str) -> Option<&'static str> {
-    const KINDS: [&str; 10] = ["asf", "amc", "bvh", "csv", "trc", "c3d", "zip", "tar", "tgz", "tzst"];
+    const KINDS: [&str; 28] = [
+        "asf", "amc", "bvh", "csv", "trc", "c3d", "zip", "tar", "tgz", "tzst", "toml", "json", "yml", "yaml",
+        "xml", "qca.txt", "mp4", "mov", "m4v", "avi", "mkv", "webm", "png", "jpg", "jpeg", "obj", "ply",
+        "npy",
+    ];
     let lower = name.to_ascii_lowercase();
     let inner = lower.strip_suffix(".zst").or(lower.strip_suffix(".gz")).unwrap_or(&lower);
     KINDS
@@ -114,6 +159,9 @@ pub(crate) fn media_type(name: &str) -> &'static str {
         Some("csv") => "text/csv; charset=utf-8",
         Some("asf" | "amc" | "bvh" | "trc") => "text/plain; charset=utf-8",
         Some("json") => "application/json",
+        Some("png") => "image/png",
+        Some("jpg" | "jpeg") => "image/jpeg",
+        Some("mp4" | "m4v") => "video/mp4",
         Some("zip") => "application/zip",
         Some("gz" | "tgz") => "application/gzip",
         Some("zst" | "tzst") => "application/zstd",
@@ -132,11 +180,20 @@ mod tests {
         assert_eq!(FileRole::of_session_file("points.csv"), Some(FileRole::ControlPoints));
         assert_eq!(FileRole::of_session_file("16_15.amc.zst"), Some(FileRole::GroundTruth));
         assert_eq!(FileRole::of_session_file("notes.txt"), None);
+        assert_eq!(FileRole::of_session_file("Calib.qca.txt"), Some(FileRole::Calibration));
+        assert_eq!(FileRole::of_session_file("cam01.MP4"), Some(FileRole::Video));
+        assert_eq!(FileRole::of_session_file("cam01.plate.png"), Some(FileRole::Plate));
+        assert_eq!(FileRole::of_session_file("plates.zip"), Some(FileRole::Plate));
+        assert_eq!(FileRole::of_session_file("images.zip"), Some(FileRole::Images));
+        assert_eq!(FileRole::of_session_file("silhouettes.tar.gz"), Some(FileRole::Masks));
+        assert!(!FileRole::Video.fits_session_file("cam01.zip"));
+        assert!(FileRole::is_scan_file("s001.obj") && !FileRole::is_scan_file("s001.bvh"));
         assert_eq!(FileRole::of_session_file(".csv"), None);
         assert!(FileRole::Skeleton.fits_session_file("a.bvh"));
         assert!(!FileRole::Skeleton.fits_session_file("a.csv"));
         assert!(FileRole::is_motion_file("all.tar.zst"));
         assert!(FileRole::is_motion_file("all.tgz"));
+        assert!(!FileRole::is_motion_file("scan.obj"));
         assert!(!FileRole::is_motion_file("points.csv"));
     }
 
@@ -150,8 +207,8 @@ mod tests {
 
     #[test]
     fn an_id_is_not_a_database_name() {
-        assert!(check_database_name("018f3f4e-0000-7000-8000-000000000000").is_err());
-        assert!(check_database_name("walks@1").is_err());
-        check_database_name("walks-2.1").unwrap();
+        assert!(check_versioned_name("motion database", "018f3f4e-0000-7000-8000-000000000000").is_err());
+        assert!(check_versioned_name("motion database", "walks@1").is_err());
+        check_versioned_name("motion database", "walks-2.1").unwrap();
     }
 }

@@ -32,10 +32,23 @@ pub(crate) trait Item: for<'r> FromRow<'r, PgRow> + Send + Unpin {
 impl PageQuery {
     /// The part of a list. `query`: rows of owner `$1` with an id below `$2`, newest first, at most `$3`.
     pub async fn of<T: Item>(&self, db: &PgPool, query: &'static str, owner: Uuid) -> Result<Json<Page<T>>> {
+        self.ending_with(db, query, owner, None).await
+    }
+
+    /// The same of a list that ends with one more item, older than all.
+    pub async fn ending_with<T: Item>(
+        &self,
+        db: &PgPool,
+        query: &'static str,
+        owner: Uuid,
+        oldest: Option<T>,
+    ) -> Result<Json<Page<T>>> {
         let limit = self.limit()?;
         // One more than is given, to see whether there is another page.
         let rows = sqlx::query_as(query).bind(owner).bind(self.before()?).bind(i64::from(limit) + 1);
         let mut items: Vec<T> = rows.fetch_all(db).await?;
+        let before = self.before()?;
+        items.extend(oldest.filter(|oldest| items.len() <= limit as usize && oldest.id() < before));
         let more = items.len() > limit as usize;
         items.truncate(limit as usize);
         let next = if more { items.last().map(|item| item.id().simple().to_string()) } else { None };

@@ -4,6 +4,7 @@ use crate::performer::FittedReport;
 use crate::{control::Markers, error::InputError};
 use formats::{BvhOptions, PointsOptions};
 use model::Axis;
+pub(crate) use payloads::JobReport;
 pub use payloads::{InputFile, MotionDatabaseFile, Object};
 use serde::{Deserialize, Serialize};
 use sparse::Parameters;
@@ -116,17 +117,4 @@ pub struct MergeChunks {
     pub fitted: Option<FittedReport>,
     /// What the plan itself took.
     pub plan: JobReport,
-}
-
-/// Who did a job, and how long it took. Goes to `run.json`, never into a motion.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JobReport {
-    /// The worker process.
-    pub worker: String,
-    /// Which attempt it was, from 1.
-    pub attempt: i32,
-    /// Time it took, seconds.
-    pub seconds: f64,
-    /// Frames that it computed.
-    pub frames: usize,
 }

@@ -41,7 +41,7 @@ const MAX_WITHOUT: usize = 10_000;
 
 impl NewMotionDatabase {
     fn check(&self) -> Result<()> {
-        names::check_database_name(&self.name)?;
+        names::check_versioned_name("motion database", &self.name)?;
         if self.base.is_none() && !self.without.is_empty() {
             return Err(Error::Unprocessable("without names clips of base, and there is no base".into()));
         }

@@ -13,6 +13,7 @@ use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use super::{
+    body_models::{self, BodyModel},
     download::{self, Object},
     lookup::{self, Latest, Lock, MotionDatabase},
 };
@@ -31,7 +32,8 @@ pub(crate) struct File {
     /// name within the session or motion database
     #[schema(example = "points.csv")]
     pub name: String,
-    /// `skeleton`, `control-points`, `ground-truth` or `motion`
+    /// `skeleton`, `control-points`, `ground-truth`, `calibration`, `video`, `images`, `masks` or `plate`; `motion` or
+    /// `scans` where databases and body models are built from it
     #[schema(example = "control-points")]
     pub role: String,
     /// media type by which it is given back
@@ -52,7 +54,8 @@ pub(crate) struct File {
 #[into_params(parameter_in = Query)]
 pub(crate) struct PutQuery {
     /// guessed from the name when left out: `.asf` skeleton; `.csv`, `.trc`, `.c3d` control points; `.amc`, `.bvh`
-    /// ground truth
+    /// ground truth; `.toml`, `.json`, `.yml`, `.xml`, `.qca.txt` calibration; `.mp4`, `.mov`, `.avi`, `.mkv`, `.webm` video;
+    /// `.png`, `.jpg` plate; archives masks, or images or plates if their name says so
     role: Option<FileRole>,
 }
 
@@ -60,7 +63,7 @@ pub(crate) struct PutQuery {
 pub(super) async fn of_owner(db: &mut PgConnection, owner: Uuid) -> Result<Vec<File>> {
     Ok(sqlx::query_as(
         "SELECT name, role, media_type, bytes, blake3, uploaded_at, store_key FROM files
-         WHERE session_id = $1 OR motion_database_id = $1 ORDER BY name COLLATE \"C\"",
+         WHERE session_id = $1 OR motion_database_id = $1 OR body_model_id = $1 ORDER BY name COLLATE \"C\"",
     )
     .bind(owner)
     .fetch_all(db)
@@ -111,7 +114,8 @@ pub(super) async fn put_in_session(
     if !role.fits_session_file(&name) {
         return Err(Error::Unprocessable(format!(
             "{name:?} can't have role {}: expected .csv, .trc or .c3d for control-points, .asf or .bvh for skeleton, \
-             .amc or .bvh for ground-truth",
+             .amc or .bvh for ground-truth, .toml, .json, .yml, .xml or .qca.txt for calibration, .mp4, .mov, .avi, .mkv or \
+             .webm for video, an archive for images and masks, a .png, a .jpg or an archive for plate",
             role.as_str()
         )));
     }
@@ -259,9 +263,91 @@ pub(super) async fn delete_of_database(
     uninterrupted(async move { remove(&app, caller.project_id, &owner, &name).await }).await
 }
 
+/// List the files of a body model
+#[utoipa::path(
+    get, path = "/v1/body-models/{body_model}/files", tag = "body models",
+    params(("body_model" = String, Path, description = "id, name or name@version")),
+    responses((status = 200, body = Vec<File>)),
+)]
+pub(super) async fn list_of_body_model(
+    State(app): State<App>,
+    Reader(caller): Reader,
+    Path(which): Path<String>,
+) -> Result<Json<Vec<File>>> {
+    let mut db = app.db.acquire().await?;
+    let model = body_models::find(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
+    Ok(Json(of_owner(&mut db, model.id).await?))
+}
+
+/// Upload a file to learn a body model from
+///
+/// An archive (zip, tar, tar.gz, tar.zst) of registered scans, OBJ or PLY, or `vertices.npy` with `faces.npy`; or such files
+/// one by one, and beside them `rig.json`, `skin_joints.npy`, `skin_weights.npy`, `scans.csv`, `subjects.csv`. Only while the
+/// model is `open` or `failed`.
+#[utoipa::path(
+    put, path = "/v1/body-models/{body_model}/files/{name}", tag = "body models",
+    params(
+        ("body_model" = String, Path, description = "id, name or name@version"),
+        ("name" = String, Path, example = "scans.zip"),
+        ("Content-Digest" = Option<String>, Header, description = "sha-256=:<base64>:"),
+    ),
+    request_body(content = String, content_type = "application/octet-stream"),
+    responses((status = 201, body = File), (status = 200, body = File, description = "replaced")),
+)]
+pub(super) async fn put_in_body_model(
+    State(app): State<App>,
+    Writer(caller): Writer,
+    Path((which, name)): Path<(String, String)>,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<(StatusCode, Json<File>)> {
+    names::check_file_name(&name)?;
+    if !FileRole::is_scan_file(&name) {
+        return Err(Error::Unprocessable(format!(
+            "{name:?} is no file of scans: expected .zip, .tar, .tar.gz, .tar.zst, .obj, .ply, .npy, rig.json or .csv"
+        )));
+    }
+    let announced = Announced::read(&headers)?;
+    let mut db = app.db.acquire().await?;
+    let model = body_models::find(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
+    drop(db);
+    check_collects_scans(&model)?;
+    let file_id = Uuid::now_v7();
+    let key = store::key::body_model_input(model.id, file_id);
+    uninterrupted(async move {
+        let stored = upload::receive(&app, &key, &announced, body).await?;
+        let owner = Owner::BodyModel(model.id);
+        let new = NewFile { id: file_id, owner, name: &name, role: FileRole::Scans, stored: &stored };
+        let kept = keep(&app, caller.project_id, &new).await;
+        settle(&app, &key, kept).await
+    })
+    .await
+}
+
+/// Delete a file of a body model
+///
+/// Only while the model is `open` or `failed`.
+#[utoipa::path(
+    delete, path = "/v1/body-models/{body_model}/files/{name}", tag = "body models",
+    params(("body_model" = String, Path, description = "id, name or name@version"), ("name" = String, Path,)),
+    responses((status = 204)),
+)]
+pub(super) async fn delete_of_body_model(
+    State(app): State<App>,
+    Writer(caller): Writer,
+    Path((which, name)): Path<(String, String)>,
+) -> Result<StatusCode> {
+    let mut db = app.db.acquire().await?;
+    let model = body_models::find(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
+    drop(db);
+    let owner = Owner::BodyModel(model.id);
+    uninterrupted(async move { remove(&app, caller.project_id, &owner, &name).await }).await
+}
+
 enum Owner {
     Session(Uuid),
     MotionDatabase(Uuid),
+    BodyModel(Uuid),
 }
 
 struct NewFile<'a> {
@@ -276,21 +362,23 @@ struct NewFile<'a> {
 async fn keep(app: &App, project_id: Uuid, new: &NewFile<'_>) -> Result<(File, Option<String>)> {
     let mut tx = app.db.begin().await?;
     let replaced = take_out(&mut tx, project_id, &new.owner, new.name).await?;
-    let (session_id, motion_database_id) = match new.owner {
-        Owner::Session(id) => (Some(id), None),
-        Owner::MotionDatabase(id) => (None, Some(id)),
+    let (session_id, motion_database_id, body_model_id) = match new.owner {
+        Owner::Session(id) => (Some(id), None, None),
+        Owner::MotionDatabase(id) => (None, Some(id), None),
+        Owner::BodyModel(id) => (None, None, Some(id)),
     };
     let bytes = i64::try_from(new.stored.bytes).map_err(|e| Error::Internal(e.to_string()))?;
     let file = sqlx::query_as(
-        "INSERT INTO files (id, project_id, session_id, motion_database_id, name, role, media_type, store_key, bytes,
-                            blake3)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)
+        "INSERT INTO files (id, project_id, session_id, motion_database_id, body_model_id, name, role, media_type, store_key,
+                            bytes, blake3)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11)
          RETURNING name, role, media_type, bytes, blake3, uploaded_at, store_key",
     )
     .bind(new.id)
     .bind(project_id)
     .bind(session_id)
     .bind(motion_database_id)
+    .bind(body_model_id)
     .bind(new.name)
     .bind(new.role.as_str())
     .bind(names::media_type(new.name))
@@ -349,9 +437,15 @@ async fn take_out(
             check_collects(&database)?;
             *id
         }
+        Owner::BodyModel(id) => {
+            let model = body_models::find(db, project_id, &id.to_string(), Latest::Any, Lock::Update).await?;
+            check_collects_scans(&model)?;
+            *id
+        }
     };
     let removed: Option<String> = sqlx::query_scalar(
-        "DELETE FROM files WHERE (session_id = $1 OR motion_database_id = $1) AND name = $2 RETURNING store_key",
+        "DELETE FROM files WHERE (session_id = $1 OR motion_database_id = $1 OR body_model_id = $1) AND name = $2
+         RETURNING store_key",
     )
     .bind(id)
     .bind(name)
@@ -373,6 +467,16 @@ fn check_collects(database: &MotionDatabase) -> Result<()> {
         state => Err(Error::Conflict(format!(
             "motion database {}@{} is {state}: its files are fixed; make a new version",
             database.name, database.version
+        ))),
+    }
+}
+
+fn check_collects_scans(model: &BodyModel) -> Result<()> {
+    match model.state.as_str() {
+        "open" | "failed" => Ok(()),
+        state => Err(Error::Conflict(format!(
+            "body model {}@{} is {state}: its files are fixed; make a new version",
+            model.name, model.version
         ))),
     }
 }

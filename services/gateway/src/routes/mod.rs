@@ -1,6 +1,8 @@
 //! The handlers, by noun.
 
+mod body_models;
 mod builds;
+mod cameras;
 mod contents;
 mod databases;
 mod download;
@@ -44,6 +46,13 @@ pub(crate) fn described() -> OpenApiRouter<App> {
         .routes(routes!(databases::clips))
         .routes(routes!(builds::build))
         .routes(routes!(builds::train))
+        .routes(routes!(body_models::create, body_models::list))
+        .routes(routes!(body_models::show, body_models::delete))
+        .routes(routes!(body_models::build))
+        .routes(routes!(body_models::file))
+        .routes(routes!(body_models::glb))
+        .routes(routes!(files::list_of_body_model))
+        .routes(routes!(files::put_in_body_model, files::delete_of_body_model))
         .routes(routes!(runs::list))
         .routes(routes!(runs::show))
         .routes(routes!(runs::cancel))

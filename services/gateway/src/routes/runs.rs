@@ -21,7 +21,7 @@ use crate::{
 pub(crate) struct Run {
     /// id
     pub id: Uuid,
-    /// `reconstruction`, `motion-database` (a build) or `training`
+    /// `reconstruction`, `multi-view` (of a session with cameras), `motion-database` or `body-model` (a build), or `training`
     #[schema(example = "reconstruction")]
     pub kind: String,
     /// `queued`, `running`, `succeeded`, `failed` or `cancelled`
@@ -39,6 +39,8 @@ pub(crate) struct Run {
     pub session_id: Option<Uuid>,
     /// the motion database that it uses
     pub motion_database_id: Option<Uuid>,
+    /// the body model that it uses; null for the shipped one
+    pub body_model_id: Option<Uuid>,
     /// everything that determines the result, resolved: files, points, database, parameters of the method
     pub parameters: Value,
     /// when it was asked for
@@ -86,7 +88,7 @@ macro_rules! select_runs {
     ($rest:literal) => {
         concat!(
             "SELECT id, kind, state, progress, phrase, error_message AS error, session_id, motion_database_id,
-                    parameters, created_at, started_at, finished_at FROM runs ",
+                    body_model_id, parameters, created_at, started_at, finished_at FROM runs ",
             $rest
         )
     };

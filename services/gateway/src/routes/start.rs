@@ -12,7 +12,9 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{
-    builds, contents, files,
+    builds,
+    cameras::{self, CameraRequest},
+    contents, files,
     lookup::{self, Latest, Lock},
     runs::{self, Run},
 };
@@ -34,9 +36,32 @@ const POINTS: std::ops::RangeInclusive<usize> = 2..=16;
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NewReconstruction {
-    /// the motion database to learn from: id, `name` (its latest version that is ready) or `name@version`
+    /// `sparse` (from control points) or `multi-view` (from calibrated cameras); what the session's files are for when left
+    /// out, and to be said if they are for both
+    #[schema(example = "sparse")]
+    kind: Option<String>,
+    /// for control points, and needed there: the motion database to learn from: id, `name` (its latest version that is
+    /// ready) or `name@version`
     #[schema(example = "walks")]
-    motion_database: String,
+    motion_database: Option<String>,
+    /// for cameras: the body model, by id, `name` (its latest version that is ready) or `name@version`; `shipped`, the one
+    /// that comes with the program, when left out
+    #[schema(example = "shipped")]
+    body_model: Option<String>,
+    /// for cameras: those to use, by the calibration's names; all that have pictures when left out
+    #[serde(default)]
+    #[schema(example = json!(["cam01", "cam02", "cam03"]))]
+    cameras: Vec<String>,
+    /// for cameras: file, or `ARCHIVE/FOLDER` -> name of its camera, where names don't tell
+    #[serde(default)]
+    #[schema(example = json!({"GX010042.MP4": "cam01"}))]
+    camera_files: BTreeMap<String, String>,
+    /// for cameras: `auto` (the plate if there is one), `plate`, `adaptive` or `mixture`; `auto` when left out
+    #[schema(example = "auto")]
+    background: Option<String>,
+    /// for cameras: metres of one unit of the calibration, where the file doesn't say it
+    #[schema(example = 0.001)]
+    metres_per_unit: Option<f64>,
     /// control points to use, by name; all that the files have when left out
     #[serde(default)]
     #[schema(example = json!(["left_wrist", "right_wrist", "left_ankle", "right_ankle"]))]
@@ -76,6 +101,64 @@ pub(crate) struct NewReconstruction {
 }
 
 impl NewReconstruction {
+    /// Whether it is for cameras: as it says, or else as the session's files are.
+    fn is_for_cameras(&self, files: &[InputFile]) -> Result<bool> {
+        let has = |role: &str| files.iter().any(|file| file.role == role);
+        match self.kind.as_deref() {
+            Some("sparse") => return Ok(false),
+            Some("multi-view") => return Ok(true),
+            Some(kind) => {
+                return Err(Error::Unprocessable(format!("kind is {kind:?}, expected sparse or multi-view")));
+            }
+            None => {}
+        }
+        match (has("control-points"), has("calibration")) {
+            (true, true) => Err(Error::Unprocessable(
+                "the session has control points and cameras; say kind: sparse or multi-view".into(),
+            )),
+            (false, true) => Ok(true),
+            (false, false) if self.motion_database.is_none() => Err(Error::Unprocessable(
+                "the session has neither control points nor cameras; upload a .csv, .trc or .c3d file, or a calibration and \
+                 what the cameras saw"
+                    .into(),
+            )),
+            _ => Ok(false),
+        }
+    }
+
+    fn for_cameras(&self) -> CameraRequest {
+        CameraRequest {
+            body_model: self.body_model.clone(),
+            cameras: self.cameras.clone(),
+            camera_files: self.camera_files.clone(),
+            background: self.background.clone(),
+            metres_per_unit: self.metres_per_unit,
+        }
+    }
+
+    /// A run on cameras: what is for control points alone must not be given.
+    fn multi_view(&self) -> Result<cameras::NewMultiView> {
+        let stray = [
+            ("motion_database", self.motion_database.is_some()),
+            ("points", !self.points.is_empty()),
+            ("mapping", !self.mapping.is_empty()),
+            ("marker_set", self.marker_set.is_some()),
+            ("marker_map", self.marker_map.is_some()),
+            ("marker_prefix", self.marker_prefix.is_some()),
+            ("bvh_metres_per_unit", self.bvh_metres_per_unit.is_some()),
+            ("method", self.method.is_some()),
+            ("window", self.window.is_some()),
+            ("neighbours", self.neighbours.is_some()),
+        ];
+        if let Some((name, _)) = stray.iter().find(|(_, is_given)| *is_given) {
+            return Err(Error::Unprocessable(format!(
+                "{name} is for sessions of control points, this one has cameras"
+            )));
+        }
+        let (up, parameters) = (self.up, self.parameters.clone());
+        Ok(cameras::NewMultiView { request: self.for_cameras(), up, parameters })
+    }
+
     fn check_points(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::Unprocessable(what));
         if self.mapping.len() > MAX_NAMES {
@@ -151,9 +234,9 @@ pub(super) fn resolve_parameters(mut given: Map<String, Value>, has_own_skeleton
     Ok(serde_json::to_value(&parameters)?)
 }
 
-/// Reconstruct a session's motion
+/// Reconstruct a session
 ///
-/// Full-body motion from the session's control points. Answers at once (202) with the run; watch it at
+/// Full-body motion from the session's control points, or the body of a person from what its cameras saw. Answers at once (202) with the run; watch it at
 /// `/v1/runs/{run_id}/events`.
 #[utoipa::path(
     post, path = "/v1/sessions/{session_id}/runs", tag = "runs", request_body = NewReconstruction,
@@ -171,8 +254,10 @@ pub(super) async fn reconstruction(
 ) -> Result<Answer> {
     let project_id = caller.project_id;
     // What is wrong with the request is said before anything is looked up.
-    body.resolve(true)?;
-    body.check_points()?;
+    if body.motion_database.is_some() {
+        body.resolve(true)?;
+        body.check_points()?;
+    }
     let bvh_metres_per_unit =
         body.bvh_metres_per_unit.unwrap_or(formats::BvhOptions::default().metres_per_unit);
     if !(1e-6..=1e3).contains(&bvh_metres_per_unit) {
@@ -185,10 +270,18 @@ pub(super) async fn reconstruction(
         return Ok(answer);
     }
     let session = lookup::session(&mut tx, project_id, session_id, Lock::Share).await?;
-    let database =
-        lookup::motion_database(&mut tx, project_id, &body.motion_database, Latest::Ready, Lock::Share)
-            .await?;
     let files = inputs(&mut tx, session_id).await?;
+    if body.is_for_cameras(&files)? {
+        let run_id = body.multi_view()?.start(&mut tx, project_id, &session, files).await?;
+        let run = runs::find(&mut tx, project_id, run_id).await?;
+        let answer = Answer::accepted(format!("/v1/runs/{run_id}"), &run)?;
+        return request.commit(tx, project_id, answer).await;
+    }
+    body.for_cameras().check_absent()?;
+    let Some(which) = &body.motion_database else {
+        return Err(Error::Unprocessable("motion_database is missing: name the one to learn from".into()));
+    };
+    let database = lookup::motion_database(&mut tx, project_id, which, Latest::Ready, Lock::Share).await?;
     let parameters = body.resolve(files.iter().any(|file| file.role == "skeleton"))?;
     let mut motion_database = database.ready()?;
     if parameters["method"] == "gplvm" {

@@ -1,0 +1,153 @@
+//! Starting runs on sessions with cameras.
+
+use std::collections::BTreeMap;
+
+use multi_view::Parameters;
+use payloads::{InputFile, PLAN_MULTI_VIEW, PlanMultiView, SHIPPED};
+use queue::{NewRun, ProjectId};
+use serde_json::{Map, Value};
+use sqlx::PgConnection;
+use uuid::Uuid;
+
+use super::{
+    body_models,
+    lookup::{Latest, Lock, Session},
+    start::start,
+};
+use crate::error::{Error, Result};
+
+/// Most files that a request names the cameras of.
+const MAX_NAMES: usize = 256;
+/// Units of calibrations, metres.
+const METRES_PER_UNIT: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
+
+/// What a request says for cameras alone.
+#[derive(Debug)]
+pub(super) struct CameraRequest {
+    /// the body model; the shipped one when left out
+    pub body_model: Option<String>,
+    /// cameras to use, by name
+    pub cameras: Vec<String>,
+    /// file -> camera
+    pub camera_files: BTreeMap<String, String>,
+    /// kind of the background model
+    pub background: Option<String>,
+    /// of the calibration
+    pub metres_per_unit: Option<f64>,
+}
+
+impl CameraRequest {
+    /// Refuses what is given of it: the session has no cameras.
+    pub fn check_absent(&self) -> Result<()> {
+        let given = [
+            ("body_model", self.body_model.is_some()),
+            ("cameras", !self.cameras.is_empty()),
+            ("camera_files", !self.camera_files.is_empty()),
+            ("background", self.background.is_some()),
+            ("metres_per_unit", self.metres_per_unit.is_some()),
+        ];
+        match given.iter().find(|(_, is_given)| *is_given) {
+            Some((name, _)) => Err(Error::Unprocessable(format!(
+                "{name} is for sessions with cameras; upload a calibration, or say kind: multi-view"
+            ))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A run on cameras, as asked for.
+#[derive(Debug)]
+pub(super) struct NewMultiView {
+    pub request: CameraRequest,
+    pub up: Option<model::Axis>,
+    pub parameters: Map<String, Value>,
+}
+
+impl NewMultiView {
+    /// The run and its first job.
+    pub async fn start(
+        self,
+        db: &mut PgConnection,
+        project_id: Uuid,
+        session: &Session,
+        files: Vec<InputFile>,
+    ) -> Result<Uuid> {
+        let parameters = self.resolve()?;
+        check_files(&files)?;
+        let Self { request, up, .. } = self;
+        if request.camera_files.len() > MAX_NAMES || request.cameras.len() > MAX_NAMES {
+            return Err(Error::Unprocessable(format!(
+                "cameras and camera_files have more than {MAX_NAMES} names, expected fewer"
+            )));
+        }
+        if let Some(metres) = request.metres_per_unit.filter(|metres| !METRES_PER_UNIT.contains(metres)) {
+            return Err(Error::Unprocessable(format!(
+                "metres_per_unit is {metres}, expected 0.000001 to 1000"
+            )));
+        }
+        let which = request.body_model.as_deref().unwrap_or(SHIPPED);
+        let model = body_models::find(db, project_id, which, Latest::Ready, Lock::Share).await?;
+        let up = up.map(serde_json::to_value).transpose()?;
+        let plan = PlanMultiView {
+            session_id: session.id,
+            session_name: session.name.clone(),
+            body_model: model.ready()?,
+            files,
+            cameras: request.cameras,
+            camera_files: request.camera_files,
+            up: up.as_ref().and_then(Value::as_str).map(str::to_owned),
+            metres_per_unit: request.metres_per_unit,
+            parameters,
+        };
+        let new = NewRun {
+            project_id: ProjectId(project_id),
+            kind: "multi-view",
+            session_id: Some(session.id),
+            parameters: serde_json::to_value(&plan)?,
+        };
+        let run_id = start(db, &new, PLAN_MULTI_VIEW).await?;
+        body_models::uses(db, run_id, Some(model.id).filter(|id| !id.is_nil())).await?;
+        Ok(run_id)
+    }
+
+    /// All parameters, those left out with their defaults.
+    fn resolve(&self) -> Result<Parameters> {
+        let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
+        let mut parameters: Parameters =
+            serde_json::from_value(Value::Object(self.parameters.clone())).map_err(|error| refuse(&error))?;
+        if let Some(kind) = &self.request.background {
+            parameters.background.model =
+                serde_json::from_value(Value::from(kind.as_str())).map_err(|_| {
+                    Error::Unprocessable(format!(
+                        "background is {kind:?}, expected auto, plate, adaptive or mixture"
+                    ))
+                })?;
+        }
+        parameters.check().map_err(|error| refuse(&error))?;
+        Ok(parameters)
+    }
+}
+
+/// A calibration, and something that cameras saw.
+fn check_files(files: &[InputFile]) -> Result<()> {
+    let count = |role: &str| files.iter().filter(|file| file.role == role).count();
+    match count("calibration") {
+        1 => {}
+        0 => {
+            return Err(Error::Unprocessable(
+                "the session has no calibration; upload a .toml, .json, .yml, .xml or .qca.txt file of its cameras first".into(),
+            ));
+        }
+        found => {
+            return Err(Error::Unprocessable(format!(
+                "the session has {found} calibration files, expected one"
+            )));
+        }
+    }
+    if ["video", "images", "masks"].iter().all(|role| count(role) == 0) {
+        return Err(Error::Unprocessable(
+            "the session has no video, images or masks; upload what the cameras saw first".into(),
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,190 @@
+//! The job that learns a body model from uploaded scans.
+
+use std::sync::Arc;
+
+use body::{LearnOptions, Learned};
+use body_files::{ScanOptions, ScanSet};
+use formats::archive::{self, Entry, Limits};
+use payloads::{BUILD_BODY_MODEL, BodyModelName, BuildBodyModel, InputFile};
+use queue::{Handler, JobContext, JobError, Outcome};
+use serde::Serialize;
+use serde_json::{Value, json};
+use service::{compute, objects};
+use sqlx::{PgConnection, types::Json};
+use store::{Stored, key};
+
+use crate::{InputError, Shared};
+
+/// Name of the model in the object store.
+const MODEL: &str = "model.marey-body";
+/// Result that says what the model was learned from.
+const SUMMARY: &str = "summary.json";
+
+pub(crate) struct BuildHandler {
+    shared: Arc<Shared>,
+}
+
+impl BuildHandler {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+}
+
+/// What a model was learned from, and how well. Shown with it.
+#[derive(Debug, Clone, Serialize)]
+struct Contents {
+    description: String,
+    num_scans: usize,
+    num_with_sex: usize,
+    num_with_age: usize,
+    num_joints: usize,
+    num_dofs: usize,
+    num_faces: usize,
+    /// by the first 1, 2, … components
+    variance_kept: Vec<f64>,
+    files: Vec<Value>,
+    warnings: Vec<String>,
+}
+
+impl Handler for BuildHandler {
+    fn kind(&self) -> &'static str {
+        BUILD_BODY_MODEL
+    }
+
+    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+        let request: BuildBodyModel = job.payload()?;
+        let (store, id) = (&self.shared.store, request.body_model.id);
+        objects::clean_up_earlier_attempts(store, &job).await;
+        let own = key::body_model_job_prefix(id, job.id().0);
+        objects::clean_up_earlier_attempts_under(store, &job, &own).await;
+        let entries = self.unpack(&job, &request.files).await?;
+        job.progress(0.3, "reading the scans");
+        let options = ScanOptions { metres_per_unit: request.metres_per_unit };
+        let set = compute::run(move || ScanSet::read(entries, &options)).await.map_err(InputError::from)?;
+        job.check()?;
+        job.progress(0.4, format!("learning from {} scans", set.num_scans()));
+        let learning = LearnOptions {
+            components: request.components,
+            description: format!(
+                "{}@{}, learned from {} scans",
+                request.body_model.name,
+                request.body_model.version,
+                set.num_scans()
+            ),
+            ..LearnOptions::default()
+        };
+        let (set, learned) = compute::run(move || {
+            let learned = set.learn(&learning)?;
+            Ok::<_, body_files::Error>((set, learned))
+        })
+        .await
+        .map_err(InputError::from)?;
+        job.check()?;
+        job.progress(0.95, "storing the model");
+        let contents = contents(&set, &learned, &request.files);
+        let bytes = learned.model.to_bytes();
+        let key = key::body_model(id, job.id().0, job.lease_number().0, MODEL).map_err(JobError::retry)?;
+        let stored = store.put(&key, bytes.into()).await.map_err(JobError::retry)?;
+        let summary = serde_json::to_vec_pretty(&contents).map_err(JobError::retry)?;
+        let summary = objects::write_result(store, &job, SUMMARY, "application/json", summary).await?;
+        let ready = Ready {
+            name: request.body_model,
+            stored,
+            num_vertices: learned.model.num_vertices(),
+            num_components: learned.model.num_components(),
+            contents,
+        };
+        Ok(Outcome::default().artefact(summary).on_complete(move |connection| {
+            let ready = ready.clone();
+            Box::pin(async move { set_ready(connection, &ready).await })
+        }))
+    }
+}
+
+impl BuildHandler {
+    /// All files that models are learned from, out of all uploads.
+    async fn unpack(&self, job: &JobContext, files: &[InputFile]) -> Result<Vec<Entry>, JobError> {
+        let memory = &self.shared.memory;
+        let mut left = memory.max_build_bytes;
+        let mut entries = Vec::new();
+        for (done, file) in files.iter().enumerate() {
+            job.check()?;
+            job.progress(0.3 * done as f64 / files.len() as f64, format!("unpacking {}", file.name));
+            let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
+            let bytes = objects::read(&self.shared.store, input, memory.max_object_bytes).await?;
+            let (name, total_bytes) = (file.name.clone(), left);
+            let unpacked = compute::run(move || -> Result<Vec<Entry>, InputError> {
+                let limits = Limits { total_bytes, ..Limits::default() };
+                let is_single = body_files::is_used(&name);
+                let mut entries = archive::entries_where(&name, &bytes, &limits, body_files::is_used)
+                    .map_err(InputError::in_file(&name))?;
+                if !is_single {
+                    entries.iter_mut().for_each(|entry| entry.name.insert_str(0, &format!("{name}/")));
+                }
+                Ok(entries)
+            })
+            .await?;
+            left = left.saturating_sub(unpacked.iter().map(|entry| entry.bytes.len() as u64).sum());
+            entries.extend(unpacked);
+        }
+        Ok(entries)
+    }
+}
+
+fn contents(set: &ScanSet, learned: &Learned, files: &[InputFile]) -> Contents {
+    let model = &learned.model;
+    let [num_with_sex, num_with_age] = set.num_told();
+    let mut warnings = set.warnings.clone();
+    if warnings.len() > 20 {
+        let more = warnings.len() - 20;
+        warnings.truncate(20);
+        warnings.push(format!("{more} more of the kind"));
+    }
+    Contents {
+        description: model.description().to_owned(),
+        num_scans: set.num_scans(),
+        num_with_sex,
+        num_with_age,
+        num_joints: model.rig().num_joints(),
+        num_dofs: model.rig().num_dofs(),
+        num_faces: model.faces().len(),
+        variance_kept: learned.variance_kept.clone(),
+        files: files
+            .iter()
+            .map(|f| json!({ "name": f.name, "bytes": f.bytes, "blake3": f.blake3 }))
+            .collect(),
+        warnings,
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Ready {
+    name: BodyModelName,
+    stored: Stored,
+    num_vertices: usize,
+    num_components: usize,
+    contents: Contents,
+}
+
+async fn set_ready(connection: &mut PgConnection, ready: &Ready) -> Result<(), JobError> {
+    // Of a model that was deleted meanwhile there is nothing to record.
+    let sql = "UPDATE body_models
+               SET store_key = $2, bytes = $3, blake3 = $4, num_vertices = $5, num_components = $6, contents = $7,
+                   ready_at = clock_timestamp()
+               WHERE id = $1 AND store_key IS NULL";
+    let updated = sqlx::query(sql)
+        .bind(ready.name.id)
+        .bind(ready.stored.key.as_str())
+        .bind(i64::try_from(ready.stored.bytes).unwrap_or(i64::MAX))
+        .bind(&ready.stored.blake3)
+        .bind(i32::try_from(ready.num_vertices).unwrap_or(i32::MAX))
+        .bind(i32::try_from(ready.num_components).unwrap_or(i32::MAX))
+        .bind(Json(&ready.contents))
+        .execute(connection)
+        .await?
+        .rows_affected();
+    if updated == 1 {
+        return Ok(());
+    }
+    Err(JobError::give_up("the body model was deleted meanwhile", ready.name.id))
+}

@@ -1,0 +1,104 @@
+//! The shape-init service: body models from scans, silhouettes from cameras, pose and shape of a person in the first frames.
+//!
+//! [`start`] runs the gRPC server (`marey.v1.ShapeInit`, health, reflection) and claims four kinds of job:
+//!
+//! ```text
+//! build-body-model          plan-multi-view ──► make-silhouettes × cameras ──► initialise-body
+//! ```
+//!
+//! The plan reads the calibration and finds out whose file is whose. One job a camera streams its frames and leaves packed
+//! silhouettes, ten seconds an artefact, with what was found of their quality. The last fits a body to the first frames and
+//! writes the results. Jobs that follow the person through all frames hang behind it and read the same artefacts.
+
+mod build_job;
+mod error;
+mod fit;
+mod frames;
+mod hull;
+mod initialise_job;
+mod members;
+mod models;
+mod payload;
+mod plan_job;
+mod results;
+mod rpc;
+mod run_report;
+mod sampling;
+mod scratch;
+mod segment;
+mod silhouettes_job;
+mod sources;
+
+pub use error::InputError;
+
+use models::Models;
+use proto::v1::shape_init_server::ShapeInitServer;
+use service::{Config, Parts, Running};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+use store::Store;
+use tokio_util::sync::CancellationToken;
+use tonic::service::Routes;
+
+/// Makes the silhouettes of one camera.
+pub const MAKE_SILHOUETTES: &str = "make-silhouettes";
+/// Finds pose and shape in the first frames.
+pub const INITIALISE_BODY: &str = "initialise-body";
+
+/// Name of the service in logs and in the queue.
+pub const NAME: &str = "shape-init";
+
+/// Where it listens unless told otherwise: this machine only.
+pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 50053);
+
+/// What all handlers of one process share.
+struct Shared {
+    store: Store,
+    pool: sqlx::PgPool,
+    models: Models,
+    memory: service::config::MemoryConfig,
+    /// How this process shows in `run.json`.
+    worker_name: String,
+}
+
+/// Starts the service; it runs until `shutdown`. [`Running::address`] says where it listens.
+///
+/// # Errors
+/// If the address, the store or the database's URL can't be used. A database that does not answer yet is
+/// waited for.
+pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Running, service::Error> {
+    let pool = service::database::pool(&config.database)?;
+    let store = Store::open(&config.store)?;
+    let shared = Arc::new(Shared {
+        models: Models::new(store.clone(), pool.clone()),
+        pool: pool.clone(),
+        store,
+        memory: config.memory.clone(),
+        worker_name: config.worker.name(NAME),
+    });
+    let rpc =
+        ShapeInitServer::new(rpc::Rpc::new(shared.clone())).max_decoding_message_size(rpc::MAX_REQUEST_BYTES);
+    let builder = config.worker.builder(NAME, &pool).map(|builder| {
+        builder
+            .handler(build_job::BuildHandler::new(shared.clone()))
+            .handler(plan_job::PlanHandler::new(shared.clone()))
+            .handler(silhouettes_job::SilhouettesHandler::new(shared.clone()))
+            .handler(initialise_job::InitialiseHandler::new(shared))
+    });
+    let parts = Parts {
+        name: NAME,
+        grpc_names: &["marey.v1.ShapeInit"],
+        routes: Routes::new(rpc),
+        descriptors: proto::FILE_DESCRIPTOR_SET,
+        worker: builder.map(|b| move |stop| b.start(stop)),
+    };
+    service::start(&config, parts, pool, shutdown).await
+}
+
+/// Runs the service until `shutdown`.
+///
+/// # Errors
+/// As [`start`], and whatever made it stop before.
+pub async fn run(config: Config, shutdown: CancellationToken) -> Result<(), service::Error> {
+    start(config, shutdown).await?.stopped().await
+}

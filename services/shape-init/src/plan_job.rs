@@ -1,0 +1,169 @@
+//! The job that reads a session's calibration, finds out whose file is whose, and plans the rest of the run.
+
+use std::{sync::Arc, time::Instant};
+
+use bytes::Bytes;
+use formats::{calibration, image_files};
+use model::Camera;
+use multi_view::CameraRecord;
+use payloads::{InputFile, JobReport, PLAN_MULTI_VIEW, PlanMultiView};
+use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
+use service::{compute, objects};
+
+use crate::{
+    INITIALISE_BODY, InputError, MAKE_SILHOUETTES, Shared, members,
+    payload::{InitialiseBody, MakeSilhouettes, Source, SourceKind},
+    sources::{self, CameraSources},
+};
+
+/// Largest calibration file, bytes.
+const MAX_CALIBRATION_BYTES: u64 = 64 << 20;
+/// Attempts of a camera: more than usual, as one may be lost with each worker that is taken away.
+const CAMERA_ATTEMPTS: i32 = 5;
+/// Share of the last job in the run's progress; that of a camera is 1.
+const INITIALISE_WEIGHT: f64 = 2.0;
+
+pub(crate) struct PlanHandler {
+    shared: Arc<Shared>,
+}
+
+impl PlanHandler {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+}
+
+impl Handler for PlanHandler {
+    fn kind(&self) -> &'static str {
+        PLAN_MULTI_VIEW
+    }
+
+    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+        let started = Instant::now();
+        let request: PlanMultiView = job.payload()?;
+        request.parameters.check().map_err(InputError::from)?;
+        job.progress(0.1, "reading the calibration");
+        // What is wrong with the model is said now, not when all silhouettes are made.
+        self.shared.models.get(&request.body_model).await?;
+        let (sources, picture_size) = self.sources(&job, &request).await?;
+        let file = calibration_file(&request.files)?;
+        let bytes = self.read(file, MAX_CALIBRATION_BYTES).await?;
+        let (mut warnings, cameras) = read_calibration(&request, file, &bytes, picture_size)?;
+        let names: Vec<String> = cameras.iter().map(|camera| camera.name.clone()).collect();
+        let matched =
+            sources::match_cameras(sources, &names, &request.cameras, &request.camera_files, &mut warnings)?;
+        let plan = JobReport {
+            worker: self.shared.worker_name.clone(),
+            attempt: job.attempt(),
+            seconds: started.elapsed().as_secs_f64(),
+            frames: 0,
+        };
+        Ok(Outcome::default().children(children(request, &cameras, matched, warnings, plan)?))
+    }
+}
+
+impl PlanHandler {
+    /// All sources of pictures, and the size of the first picture in an archive, for calibrations that don't say it.
+    async fn sources(
+        &self,
+        job: &JobContext,
+        request: &PlanMultiView,
+    ) -> Result<(Vec<Source>, Option<[u32; 2]>), JobError> {
+        let most = self.shared.memory.max_build_bytes;
+        let (mut found, mut size) = (Vec::new(), None);
+        for file in &request.files {
+            job.check()?;
+            if !sources::is_archive(file) {
+                found.extend(sources::of_file(file));
+                continue;
+            }
+            job.progress(0.2, format!("looking into {}", file.name));
+            let bytes = self.read(file, self.shared.memory.max_object_bytes).await?;
+            let (of, needs_size) = (file.clone(), size.is_none());
+            let (sources, first) = compute::run(move || -> Result<_, InputError> {
+                let sources = sources::of_archive(&of, &bytes, most)?;
+                let first = if needs_size { first_size(&sources, &bytes, most)? } else { None };
+                Ok((sources, first))
+            })
+            .await?;
+            found.extend(sources);
+            size = size.or(first);
+        }
+        Ok((found, size))
+    }
+
+    async fn read(&self, file: &InputFile, max_bytes: u64) -> Result<Bytes, JobError> {
+        let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
+        objects::read(&self.shared.store, input, max_bytes).await
+    }
+}
+
+/// Size of the first picture of the first source, if it is one.
+fn first_size(sources: &[Source], bytes: &Bytes, max_bytes: u64) -> Result<Option<[u32; 2]>, InputError> {
+    let Some(source) = sources.iter().find(|source| source.kind != SourceKind::Plate) else {
+        return Ok(None);
+    };
+    let Some(of_source) = &source.members else { return Ok(None) };
+    let entries = members::read(&source.file.name, bytes, of_source, max_bytes)?;
+    Ok(entries
+        .first()
+        .and_then(|first| image_files::size(&first.bytes, &image_files::Limits::default()).ok()))
+}
+
+/// The only calibration of a session.
+fn calibration_file(files: &[InputFile]) -> Result<&InputFile, InputError> {
+    let found: Vec<&InputFile> = files.iter().filter(|file| file.role == "calibration").collect();
+    match found[..] {
+        [only] => Ok(only),
+        _ => {
+            let names: Vec<&str> = found.iter().map(|file| file.name.as_str()).collect();
+            let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
+            Err(InputError::Count { role: "calibration", found: found.len(), names, expected: "one" })
+        }
+    }
+}
+
+/// Cameras of the calibration, and what was assumed of them.
+fn read_calibration(
+    request: &PlanMultiView,
+    file: &InputFile,
+    bytes: &Bytes,
+    image_size: Option<[u32; 2]>,
+) -> Result<(Vec<String>, Vec<Camera>), InputError> {
+    let up = request.up.as_ref().map(|up| up.parse()).transpose();
+    let up =
+        up.map_err(|_| InputError::unexpected("up", format!("{:?}", request.up), "x, y, z, -x, -y or -z"))?;
+    let options = calibration::Options { up, metres_per_unit: request.metres_per_unit, image_size };
+    let read = calibration::read(&file.name, bytes, &options).map_err(InputError::in_file(&file.name))?;
+    let warnings = read.warnings.into_iter().map(|w| format!("{}: {}", file.name, w.message)).collect();
+    Ok((warnings, read.value))
+}
+
+/// One job a camera, and the one that waits for all of them.
+fn children(
+    request: PlanMultiView,
+    cameras: &[Camera],
+    matched: Vec<CameraSources>,
+    warnings: Vec<String>,
+    plan: JobReport,
+) -> Result<Vec<ChildJob>, JobError> {
+    let num_cameras = matched.len();
+    let mut jobs = Vec::with_capacity(num_cameras + 1);
+    for (index, of) in matched.into_iter().enumerate() {
+        let payload = MakeSilhouettes {
+            index,
+            camera: CameraRecord::from(&cameras[of.camera]),
+            source: of.pictures,
+            plate: of.plate,
+            parameters: request.parameters.clone(),
+        };
+        let payload = serde_json::to_value(payload).map_err(JobError::retry)?;
+        jobs.push(ChildJob::new(MAKE_SILHOUETTES, payload).max_attempts(CAMERA_ATTEMPTS));
+    }
+    let initialise =
+        serde_json::to_value(InitialiseBody { request, warnings, plan }).map_err(JobError::retry)?;
+    let last =
+        ChildJob::new(INITIALISE_BODY, initialise).weight(INITIALISE_WEIGHT).depends_on(0..num_cameras);
+    jobs.push(last);
+    Ok(jobs)
+}

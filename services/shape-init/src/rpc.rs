@@ -1,0 +1,155 @@
+//! `marey.v1.ShapeInit`: bodies and hulls at once.
+
+use std::sync::Arc;
+
+use formats::{calibration, calibration::fit_to_image, image_files};
+use model::{Camera, Silhouette};
+use payloads::BodyModelFile;
+use proto::v1::{self, MeshFormat, shape_init_server::ShapeInit};
+use service::compute;
+use tokio::sync::Semaphore;
+use tonic::{Request, Response, Status};
+
+use crate::{
+    InputError, Shared,
+    error::CallError,
+    hull::hull,
+    sampling::{out_of_range, sample},
+};
+
+/// Largest request, bytes: silhouettes as PNG take some kilobytes each, photographs of masks a megabyte.
+pub(crate) const MAX_REQUEST_BYTES: usize = 32 << 20;
+/// Most silhouettes of a preview.
+const MAX_VIEWS: usize = 64;
+const CELL_M: f64 = 0.01;
+
+pub(crate) struct Rpc {
+    shared: Arc<Shared>,
+    /// Calls that compute at once: one a core, the rest wait.
+    slots: Semaphore,
+}
+
+impl Rpc {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        let slots = std::thread::available_parallelism().map_or(1, usize::from);
+        Self { shared, slots: Semaphore::new(slots) }
+    }
+
+    async fn model(&self, which: &str) -> Result<(BodyModelFile, Arc<body::BodyModel>), CallError> {
+        let file = self.shared.models.find(which).await?;
+        let model = self.shared.models.get(&file).await.map_err(CallError::Model)?;
+        Ok((file, model))
+    }
+
+    async fn sample(&self, request: v1::SampleBodyRequest) -> Result<v1::SampleBodyResponse, CallError> {
+        let (_, model) = self.model(&request.body_model_id).await?;
+        // A failure to get a slot would mean that the semaphore was closed, which nobody does.
+        let _slot = self.slots.acquire().await;
+        compute::run(move || {
+            let shape = sample(&model, &request)?;
+            let mesh = match request.format() {
+                MeshFormat::Glb => body_files::glb(&model, &shape, None).map_err(InputError::from)?,
+                MeshFormat::Ply => formats::ply::write(&shape.mesh(&model)),
+            };
+            let m = shape.measurements(&model);
+            let measurements = v1::BodyMeasurements {
+                stature_m: m.stature_m,
+                mass_kg: m.mass_kg,
+                arm_span_m: m.arm_span_m,
+                inseam_m: m.inseam_m,
+                chest_m: m.chest_m,
+                waist_m: m.waist_m,
+                hip_m: m.hip_m,
+            };
+            Ok(v1::SampleBodyResponse { mesh, alpha: shape.alpha, measurements: Some(measurements) })
+        })
+        .await
+    }
+
+    async fn preview(&self, request: v1::PreviewHullRequest) -> Result<v1::PreviewHullResponse, CallError> {
+        let cell_m = if request.cell_m == 0.0 { CELL_M } else { request.cell_m };
+        if !(0.004..=0.1).contains(&cell_m) {
+            return Err(out_of_range("cell_m", &cell_m.to_string(), "0.004 to 0.1").into());
+        }
+        if !(2..=MAX_VIEWS).contains(&request.silhouettes.len()) {
+            let found = request.silhouettes.len().to_string();
+            return Err(out_of_range("silhouettes", &found, "2 to 64").into());
+        }
+        let _slot = self.slots.acquire().await;
+        compute::run(move || -> Result<_, CallError> {
+            let (views, warnings) = views(&request)?;
+            let found = hull(&views, cell_m)?;
+            let mesh = match request.format() {
+                MeshFormat::Glb => {
+                    formats::glb::write_mesh("hull", &found.mesh).map_err(InputError::in_file("hull"))?
+                }
+                MeshFormat::Ply => formats::ply::write(&found.mesh),
+            };
+            Ok(v1::PreviewHullResponse { mesh, pieces_m3: found.pieces_m3, warnings })
+        })
+        .await
+    }
+}
+
+type Views = Vec<(Camera, Silhouette)>;
+
+/// Cameras and silhouettes of a request, and what was assumed of them.
+fn views(request: &v1::PreviewHullRequest) -> Result<(Views, Vec<String>), InputError> {
+    let name = &request.calibration_name;
+    let read = calibration::read(name, &request.calibration, &calibration::Options::default())
+        .map_err(InputError::in_file(name))?;
+    let mut warnings: Vec<String> = read.warnings.into_iter().map(|w| w.message).collect();
+    let mut views = Vec::new();
+    for given in &request.silhouettes {
+        let camera = read.value.iter().find(|camera| camera.name == given.camera).ok_or_else(|| {
+            let names: Vec<&str> = read.value.iter().map(|camera| camera.name.as_str()).collect();
+            InputError::unexpected("silhouettes", format!("camera {:?}", given.camera), names.join(", "))
+        })?;
+        let in_file = InputError::in_file(&given.camera);
+        let mask =
+            image_files::read_silhouette(&given.image, &image_files::Limits::default()).map_err(&in_file)?;
+        // sides were limited just now
+        let size = [mask.value.width() as u32, mask.value.height() as u32];
+        let fitted = fit_to_image(camera, size).map_err(&in_file)?;
+        warnings.extend(mask.warnings.into_iter().chain(fitted.warnings).map(|w| w.message));
+        views.push((fitted.value, mask.value));
+    }
+    Ok((views, warnings))
+}
+
+#[tonic::async_trait]
+impl ShapeInit for Rpc {
+    async fn describe_body_model(
+        &self,
+        request: Request<v1::DescribeBodyModelRequest>,
+    ) -> Result<Response<v1::DescribeBodyModelResponse>, Status> {
+        let (file, model) = self.model(&request.into_inner().body_model_id).await?;
+        let rig = model.rig();
+        let parent = |parent: Option<usize>| parent.map_or(-1, |p| i32::try_from(p).unwrap_or(i32::MAX));
+        let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        Ok(Response::new(v1::DescribeBodyModelResponse {
+            description: model.description().to_owned(),
+            num_vertices: count(model.num_vertices()),
+            num_faces: count(model.faces().len()),
+            variance_kept: model.variance_kept().to_vec(),
+            joint_names: rig.joints().iter().map(|joint| joint.name.clone()).collect(),
+            joint_parents: rig.joints().iter().map(|joint| parent(joint.parent)).collect(),
+            dof_names: rig.dofs().iter().map(|dof| dof.name.clone()).collect(),
+            blake3: file.blake3,
+        }))
+    }
+
+    async fn sample_body(
+        &self,
+        request: Request<v1::SampleBodyRequest>,
+    ) -> Result<Response<v1::SampleBodyResponse>, Status> {
+        Ok(Response::new(self.sample(request.into_inner()).await?))
+    }
+
+    async fn preview_hull(
+        &self,
+        request: Request<v1::PreviewHullRequest>,
+    ) -> Result<Response<v1::PreviewHullResponse>, Status> {
+        Ok(Response::new(self.preview(request.into_inner()).await?))
+    }
+}

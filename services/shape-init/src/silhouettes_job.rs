@@ -1,0 +1,292 @@
+//! The job that makes the silhouettes of one camera.
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Instant,
+};
+
+use formats::{calibration::fit_to_image, image_files};
+use model::Image;
+use multi_view::CameraRecord;
+use payloads::{InputFile, JobReport};
+use queue::{Artefact, Handler, JobContext, JobError, Outcome};
+use service::{compute, objects};
+use tempfile::TempDir;
+use tokio::sync::mpsc;
+
+use crate::{
+    InputError, MAKE_SILHOUETTES, Shared,
+    frames::Frames,
+    members,
+    payload::{
+        CameraReport, ClipPlace, MakeSilhouettes, Source, SourceKind, clip_name, file_part, picture_name,
+        report_name,
+    },
+    scratch,
+    segment::{self, Made, Piece, Sink},
+};
+
+/// Pieces that wait to be written, at most.
+const WAITING: usize = 2;
+/// Colour of the outline of silhouettes.
+const OUTLINE: [u8; 3] = [255, 230, 0];
+
+pub(crate) struct SilhouettesHandler {
+    shared: Arc<Shared>,
+}
+
+impl SilhouettesHandler {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+}
+
+impl Handler for SilhouettesHandler {
+    fn kind(&self) -> &'static str {
+        MAKE_SILHOUETTES
+    }
+
+    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+        let started = Instant::now();
+        let Shared { store, worker_name, .. } = &*self.shared;
+        objects::clean_up_earlier_attempts(store, &job).await;
+        let payload: MakeSilhouettes = job.payload()?;
+        let index = payload.index;
+        job.progress(0.0, format!("camera {}: reading {}", payload.camera.name, payload.source.name));
+        let scratch = TempDir::new().map_err(JobError::retry)?;
+        let opened = self.open(&payload, &scratch).await?;
+        let plate = self.plate(payload.plate.as_ref()).await?;
+        job.check()?;
+        let (made, written) = self.make(&job, &payload, opened, plate).await?;
+        let (camera, made) = made;
+        let report = CameraReport {
+            index,
+            camera,
+            source: payload.source.name.clone(),
+            plate: payload.plate.as_ref().map(|plate| plate.name.clone()),
+            end_frame: made.made.end_frame,
+            frame_rate: made.frame_rate,
+            quality: made.made.quality,
+            warnings: made.made.warnings,
+            clips: written.clips,
+            job: JobReport {
+                worker: worker_name.clone(),
+                attempt: job.attempt(),
+                seconds: started.elapsed().as_secs_f64(),
+                frames: made.made.end_frame - payload.parameters.first_frame,
+            },
+        };
+        let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
+        let report = objects::write(store, &job, &report_name(index), "application/json", report).await?;
+        Ok(written.artefacts.into_iter().fold(Outcome::default(), Outcome::artefact).artefact(report))
+    }
+}
+
+/// The pictures of a camera, ready to be read.
+enum Opened {
+    Masks(Vec<formats::archive::Entry>),
+    Frames(Frames),
+}
+
+/// What came of a camera.
+struct OfCamera {
+    made: Made,
+    frame_rate: Option<f64>,
+}
+
+#[derive(Default)]
+struct Written {
+    artefacts: Vec<Artefact>,
+    clips: Vec<ClipPlace>,
+}
+
+impl SilhouettesHandler {
+    async fn open(&self, payload: &MakeSilhouettes, scratch: &TempDir) -> Result<Opened, JobError> {
+        let source = &payload.source;
+        let name = source.name.clone();
+        match source.kind {
+            SourceKind::Video => {
+                let path = scratch::copy(&self.shared.store, &source.file, scratch.path()).await?;
+                let largest_side = payload.parameters.largest_side;
+                Ok(Opened::Frames(Frames::Video { path, name, largest_side }))
+            }
+            SourceKind::Masks => Ok(Opened::Masks(self.entries(source).await?)),
+            SourceKind::Images | SourceKind::Plate => {
+                let entries = self.entries(source).await?;
+                Ok(Opened::Frames(Frames::Pictures { entries, name }))
+            }
+        }
+    }
+
+    async fn entries(&self, source: &Source) -> Result<Vec<formats::archive::Entry>, JobError> {
+        let bytes = self.read(&source.file).await?;
+        let (name, members) = (source.file.name.clone(), source.members.clone());
+        let most = self.shared.memory.max_build_bytes;
+        let read = compute::run(move || match &members {
+            Some(members) => members::read(&name, &bytes, members, most),
+            None => Ok(vec![formats::archive::Entry { name, bytes: bytes.to_vec() }]),
+        });
+        Ok(read.await?)
+    }
+
+    async fn read(&self, file: &InputFile) -> Result<bytes::Bytes, JobError> {
+        let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
+        objects::read(&self.shared.store, input, self.shared.memory.max_object_bytes).await
+    }
+
+    async fn plate(&self, source: Option<&Source>) -> Result<Option<Image>, JobError> {
+        let Some(source) = source else { return Ok(None) };
+        let entries = self.entries(source).await?;
+        let name = source.name.clone();
+        let read = compute::run(move || {
+            let entry =
+                entries.first().ok_or_else(|| InputError::unexpected(&name, "nothing", "a picture"))?;
+            image_files::read_image(&entry.bytes, &image_files::Limits::default())
+                .map_err(InputError::in_file(&name))
+        });
+        Ok(Some(read.await?))
+    }
+
+    /// Makes silhouettes on a thread of their own and writes them as they come.
+    async fn make(
+        &self,
+        job: &JobContext,
+        payload: &MakeSilhouettes,
+        opened: Opened,
+        plate: Option<Image>,
+    ) -> Result<((CameraRecord, OfCamera), Written), JobError> {
+        let (sender, mut receiver) = mpsc::channel(WAITING);
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let mut sink = JobSink { job: job.clone(), camera: payload.camera.name.clone(), sender, cancelled };
+        let of = payload.clone();
+        let made = compute::run(move || make(&of, &opened, plate.as_ref(), &mut sink));
+        let written = async {
+            let mut written = Written::default();
+            while let Some(piece) = receiver.recv().await {
+                self.write(job, payload, piece, &mut written).await?;
+            }
+            Ok::<_, JobError>(written)
+        };
+        let (made, written) = tokio::join!(made, written);
+        job.check()?;
+        let written = written?;
+        // stopped without a reason of the input's: the job is to end, and check() has said so, or nothing was written
+        let made = made?.ok_or(JobError::Stopped)?;
+        Ok((made, written))
+    }
+
+    async fn write(
+        &self,
+        job: &JobContext,
+        payload: &MakeSilhouettes,
+        piece: Piece,
+        written: &mut Written,
+    ) -> Result<(), JobError> {
+        let store = &self.shared.store;
+        match piece {
+            Piece::Clip { first_frame, num_frames, bytes } => {
+                let name = clip_name(payload.index, first_frame);
+                let artefact = objects::write(store, job, &name, "application/octet-stream", bytes).await?;
+                written.artefacts.push(artefact);
+                written.clips.push(ClipPlace { name, first_frame, num_frames });
+            }
+            Piece::Picture { frame, mut image, silhouette } => {
+                let is_first = frame == payload.parameters.first_frame;
+                let (plain, drawn) = compute::run(move || {
+                    let plain = image_files::write_image(&image);
+                    shape_fit::draw_outline(&mut image, &silhouette, OUTLINE);
+                    (plain, image_files::write_image(&image))
+                })
+                .await;
+                let name = picture_name(payload.index, frame);
+                written.artefacts.push(objects::write(store, job, &name, "image/png", plain).await?);
+                if is_first {
+                    // A run that fails later shows here what its cameras saw.
+                    let name = format!("silhouette_{}.png", file_part(&payload.camera.name, payload.index));
+                    written
+                        .artefacts
+                        .push(objects::write_result(store, job, &name, "image/png", drawn).await?);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// All of the work on the frames; `None` if it was stopped.
+fn make(
+    payload: &MakeSilhouettes,
+    opened: &Opened,
+    plate: Option<&Image>,
+    sink: &mut JobSink,
+) -> Result<Option<(CameraRecord, OfCamera)>, InputError> {
+    let calibrated = payload
+        .camera
+        .camera()
+        .map_err(|e| InputError::unexpected(&payload.camera.name, e.to_string(), "a camera"))?;
+    let (size, frame_rate) = match opened {
+        Opened::Masks(entries) => {
+            let frames =
+                entries.first().map(|entry| image_files::size(&entry.bytes, &image_files::Limits::default()));
+            let first = entries.first().map_or("", |entry| entry.name.as_str());
+            let size = frames
+                .transpose()
+                .map_err(InputError::in_file(&format!("{}: {first}", payload.source.name)))?;
+            (size.unwrap_or_default(), None)
+        }
+        Opened::Frames(frames) => {
+            let announced = frames.announced()?;
+            (announced.size, announced.rate)
+        }
+    };
+    let fitted = fit_to_image(&calibrated, size).map_err(InputError::in_file(&payload.source.name))?;
+    let name = &payload.source.name;
+    let cancelled = sink.cancelled.clone();
+    let made = match opened {
+        Opened::Masks(entries) => segment::of_masks(name, entries, &payload.parameters, sink)?,
+        Opened::Frames(frames) => {
+            segment::of_frames(name, frames, plate, &payload.parameters, &cancelled, sink)?
+        }
+    };
+    let Some(mut made) = made else { return Ok(None) };
+    let assumed = fitted.warnings.into_iter().map(|warning| warning.message);
+    made.warnings = assumed.chain(made.warnings).collect();
+    Ok(Some((CameraRecord::from(&fitted.value), OfCamera { made, frame_rate })))
+}
+
+/// Sends pieces to where they are written, and progress to the user.
+struct JobSink {
+    job: JobContext,
+    camera: String,
+    sender: mpsc::Sender<Piece>,
+    cancelled: Arc<AtomicBool>,
+}
+
+impl JobSink {
+    fn goes_on(&self) -> bool {
+        let is_over = self.job.is_cancelled();
+        if is_over {
+            self.cancelled.store(true, Ordering::Relaxed);
+        }
+        !is_over
+    }
+}
+
+impl Sink for JobSink {
+    fn piece(&mut self, piece: Piece) -> bool {
+        // the receiver is gone when writing failed
+        self.sender.blocking_send(piece).is_ok() && self.goes_on()
+    }
+
+    fn frame_done(&mut self, done: usize, expected: Option<usize>) -> bool {
+        let of = expected.map_or_else(String::new, |count| format!(" of {count}"));
+        let share = expected.map_or(0.5, |count| done as f64 / count.max(1) as f64);
+        let phrase =
+            if done == 0 { "learning the background".to_owned() } else { format!("frame {done}{of}") };
+        self.job.progress(share.min(0.99), format!("camera {}: {phrase}", self.camera));
+        self.goes_on()
+    }
+}

@@ -1,0 +1,139 @@
+//! Which files are which camera's.
+
+use std::collections::BTreeMap;
+
+use bytes::Bytes;
+use multi_view::assign;
+use payloads::InputFile;
+
+use crate::{
+    InputError,
+    members::{groups, is_picture, pictures},
+    payload::{Members, Source, SourceKind},
+};
+
+/// Pictures and plate of one camera.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CameraSources {
+    /// index among the calibrated cameras
+    pub camera: usize,
+    pub pictures: Source,
+    pub plate: Option<Source>,
+}
+
+/// How a file is read, by its role; `None` for those that hold no pictures.
+pub(crate) fn kind_of(role: &str) -> Option<SourceKind> {
+    match role {
+        "video" => Some(SourceKind::Video),
+        "images" => Some(SourceKind::Images),
+        "masks" => Some(SourceKind::Masks),
+        "plate" => Some(SourceKind::Plate),
+        _ => None,
+    }
+}
+
+/// Whether the file has to be looked into to know its sources.
+pub(crate) fn is_archive(file: &InputFile) -> bool {
+    kind_of(&file.role).is_some_and(|kind| kind != SourceKind::Video) && !is_picture(&file.name)
+}
+
+/// The sources of an archive: folders of frames, or single plates.
+///
+/// # Errors
+/// If the archive is damaged or holds no picture.
+pub(crate) fn of_archive(file: &InputFile, bytes: &Bytes, max_bytes: u64) -> Result<Vec<Source>, InputError> {
+    let Some(kind) = kind_of(&file.role) else { return Ok(Vec::new()) };
+    let names = pictures(&file.name, bytes, max_bytes)?;
+    if names.is_empty() {
+        return Err(InputError::unexpected(&file.name, "no PNG or JPEG in it", "pictures, one a frame"));
+    }
+    let source = |inside: &str, members: Members| {
+        let name = if inside.is_empty() { file.name.clone() } else { format!("{}/{inside}", file.name) };
+        Source { name, kind, file: file.clone(), members: Some(members) }
+    };
+    if kind == SourceKind::Plate {
+        return Ok(names.iter().map(|name| source(name, Members::One(name.clone()))).collect());
+    }
+    let of_group = |members: Members| {
+        let inside = match &members {
+            Members::Prefix { folder, prefix } if !folder.is_empty() => format!("{folder}/{prefix}"),
+            Members::Folder(inside) | Members::One(inside) | Members::Prefix { prefix: inside, .. } => {
+                inside.clone()
+            }
+        };
+        source(&inside, members)
+    };
+    Ok(groups(&names).into_iter().map(of_group).collect())
+}
+
+/// The source that a file is by itself.
+pub(crate) fn of_file(file: &InputFile) -> Option<Source> {
+    let kind = kind_of(&file.role)?;
+    Some(Source { name: file.name.clone(), kind, file: file.clone(), members: None })
+}
+
+/// Puts sources and cameras together. Cameras that nobody asked for and that have no pictures are left out, with a warning.
+///
+/// # Errors
+/// If a file has no camera, a camera two, or one that was asked for none.
+pub(crate) fn match_cameras(
+    sources: Vec<Source>,
+    cameras: &[String],
+    asked: &[String],
+    map: &BTreeMap<String, String>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<CameraSources>, InputError> {
+    if let Some(unknown) = asked.iter().find(|name| !cameras.contains(name)) {
+        return Err(InputError::unexpected("cameras", format!("{unknown:?}"), cameras.join(", ")));
+    }
+    let (plates, pictures): (Vec<Source>, Vec<Source>) =
+        sources.into_iter().partition(|source| source.kind == SourceKind::Plate);
+    let known = |of: &[Source]| -> (Vec<String>, BTreeMap<String, String>) {
+        let names: Vec<String> = of.iter().map(|source| source.name.clone()).collect();
+        let own = map.iter().filter(|(name, _)| names.contains(name));
+        let own = own.map(|(name, camera)| (name.clone(), camera.clone())).collect();
+        (names, own)
+    };
+    let (names, own) = known(&pictures);
+    let (plate_names, plate_map) = known(&plates);
+    if let Some(stray) = map.keys().find(|name| !own.contains_key(*name) && !plate_map.contains_key(*name)) {
+        let all = names.iter().chain(&plate_names).cloned().collect::<Vec<_>>().join(", ");
+        return Err(InputError::unexpected("camera_files", format!("{stray:?}"), format!("one of {all}")));
+    }
+    let assigned = assign(&names, cameras, &own)?;
+    let mut found: Vec<CameraSources> = assigned
+        .into_iter()
+        .map(|a| CameraSources { camera: a.camera, pictures: pictures[a.source].clone(), plate: None })
+        .collect();
+    for assigned in assign(&plate_names, cameras, &plate_map)? {
+        match found.iter_mut().find(|of| of.camera == assigned.camera) {
+            Some(of) => of.plate = Some(plates[assigned.source].clone()),
+            None => warnings.push(format!("{}: its camera has no pictures", plate_names[assigned.source])),
+        }
+    }
+    found.sort_by_key(|of| of.camera);
+    if !asked.is_empty() {
+        found.retain(|of| asked.contains(&cameras[of.camera]));
+    }
+    for (index, name) in cameras.iter().enumerate() {
+        let is_missing = found.iter().all(|of| of.camera != index);
+        if is_missing && asked.contains(name) {
+            return Err(InputError::unexpected(
+                format!("camera {name}"),
+                "no video, pictures or masks",
+                "a file named after it",
+            ));
+        }
+        if is_missing && asked.is_empty() {
+            warnings.push(format!("camera {name} has no video, pictures or masks: it is not used"));
+        }
+    }
+    if found.len() < 2 {
+        return Err(InputError::unexpected(
+            "session",
+            format!("pictures of {} of the calibrated cameras", found.len()),
+            "at least 2",
+        ));
+    }
+    Ok(found)
+}
