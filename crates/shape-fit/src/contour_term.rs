@@ -152,7 +152,7 @@ impl Term<'_> {
     fn push_rows(&self, level: &Level, scratch: &mut Scratch, i: usize) {
         let (mut information, gradient) = scratch.gathered[i];
         let trace = information.trace();
-        if !(trace > 0.0) {
+        if trace.is_nan() || trace <= 0.0 {
             return;
         }
         information += Matrix2::identity() * (1e-9 * trace);

@@ -222,7 +222,7 @@ impl Frame {
         self.camera_of.iter().zip(&ious).for_each(|(&camera, &iou)| views[camera].iou = iou);
         let used: Vec<f64> = views.iter().filter(|view| view.is_used).map(|view| view.iou).collect();
         let mean = used.iter().sum::<f64>() / used.len().max(1) as f64;
-        if !(mean >= options.least_iou) {
+        if mean < options.least_iou {
             let worst = views.iter().filter(|view| view.is_used).min_by(|a, b| a.iou.total_cmp(&b.iou));
             return Err(Error::NotFound {
                 iou: mean,
