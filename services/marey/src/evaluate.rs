@@ -4,6 +4,7 @@ pub(crate) mod motions;
 
 mod body_commands;
 mod run_command;
+mod shape;
 mod sparse_command;
 mod sweep;
 mod written;
@@ -25,6 +26,8 @@ enum What {
     Feet(body_commands::Args),
     /// Compare what a run has made with the motion that really was
     Run(run_command::Args),
+    /// Find pose and shape of a known body in silhouettes, and compare
+    Shape(Box<shape::Args>),
 }
 
 /// Runs `marey evaluate`.
@@ -34,5 +37,6 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         What::Skeleton(args) => body_commands::skeletons(&args),
         What::Feet(args) => body_commands::feet(&args),
         What::Run(args) => run_command::run(&args),
+        What::Shape(args) => shape::run(&args),
     }
 }
