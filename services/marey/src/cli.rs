@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    bench, cmu, connection::Server, database, demo, evaluate, health, keys, live, marker_sets, results, run,
+    bench, body, cmu, connection::Server, database, demo, evaluate, health, keys, live, marker_sets, results, run,
     sample, serve, status, up, upload,
 };
 
@@ -29,6 +29,10 @@ First session:
   marey run \"take 3\" --database walks --watch
   marey results RUN -o take3/                   then open take3/motion.bvh
 
+A body from calibrated cameras:
+  marey upload \"take 4\" calib.toml cam*.mp4 plates/
+  marey run \"take 4\" --watch
+
 Commands that talk to a server find one started by `marey up` in this folder or above. For another:
   export MAREY_URL=https://mocap.example MAREY_API_KEY=mk_…";
 
@@ -39,6 +43,9 @@ enum Command {
     /// Build and list motion databases: the recordings that Marey learns from
     #[command(subcommand)]
     Db(database::Command),
+    /// Learn, list and sample body models: the bodies that people may have
+    #[command(subcommand)]
+    Body(body::Command),
     Upload(upload::Args),
     Run(run::Args),
     Markers(marker_sets::Args),
@@ -75,6 +82,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Demo(args) => demo::run(&args),
         Command::Up(args) => up::run(&args),
         Command::Db(command) => database::run(&command),
+        Command::Body(command) => body::run(&command),
         Command::Upload(args) => upload::run(&args),
         Command::Run(args) => run::run(&args),
         Command::Markers(args) => marker_sets::run(&args),

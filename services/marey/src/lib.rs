@@ -3,6 +3,7 @@
 //! The program is a library so that tests can start it as a process of its own.
 
 mod bench;
+mod body;
 mod cli;
 mod client;
 mod cmu;
@@ -20,6 +21,7 @@ mod results;
 mod run;
 mod sample;
 mod serve;
+mod session_files;
 mod status;
 mod take;
 mod up;

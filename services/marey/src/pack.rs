@@ -121,19 +121,74 @@ fn has_extension(name: &str, extensions: &[&str]) -> bool {
 
 /// All motion files under `folder`, with their paths relative to `base`.
 pub fn collect(base: &Path, folder: &Path, found: &mut Vec<(PathBuf, PathBuf)>) -> anyhow::Result<()> {
+    collect_where(base, folder, &is_motion_file, found)
+}
+
+/// All files under `folder` whose names are wanted, with their paths relative to `base`; a file is one by itself.
+pub fn collect_where(
+    base: &Path,
+    folder: &Path,
+    is_wanted: &dyn Fn(&str) -> bool,
+    found: &mut Vec<(PathBuf, PathBuf)>,
+) -> anyhow::Result<()> {
+    if !folder.is_dir() {
+        found.push((folder.to_owned(), folder.strip_prefix(base)?.to_owned()));
+        return Ok(());
+    }
     for entry in fs::read_dir(folder).with_context(|| folder.display().to_string())? {
         let entry = entry?;
         let path = entry.path();
         if entry.file_type()?.is_dir() {
-            collect(base, &path, found)?;
-        } else if is_motion_file(&entry.file_name().to_string_lossy()) && path.is_file() {
+            collect_where(base, &path, is_wanted, found)?;
+        } else if is_wanted(&entry.file_name().to_string_lossy()) && path.is_file() {
             found.push((path.clone(), path.strip_prefix(base)?.to_owned()));
         }
     }
     Ok(())
 }
 
-fn write_tar(files: &[(PathBuf, PathBuf)]) -> anyhow::Result<File> {
+/// Whether a file is an archive by its name.
+pub fn is_archive(name: &str) -> bool {
+    has_extension(name, &ARCHIVES)
+}
+
+/// Archives as they are; whatever else is wanted in one archive.
+pub fn pack_where(
+    name: &str,
+    paths: &[PathBuf],
+    is_wanted: &dyn Fn(&str) -> bool,
+) -> anyhow::Result<Vec<Upload>> {
+    let (mut uploads, mut loose) = (Vec::new(), Vec::new());
+    for path in paths {
+        let file_name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        if path.is_dir() {
+            // folders side by side keep their names, so that files of one name don't meet
+            let base = path.parent().unwrap_or(Path::new(""));
+            collect_where(base, path, is_wanted, &mut loose)?;
+        } else if is_archive(&file_name) {
+            uploads.push(Upload { name: file_name, file: open(path)?, num_files: 0 });
+        } else if is_wanted(&file_name) {
+            loose.push((path.clone(), file_name.into()));
+        } else {
+            bail!("{} is no archive, no folder and no file of scans", path.display());
+        }
+    }
+    loose.sort_by(|a, b| a.1.cmp(&b.1));
+    if !loose.is_empty() {
+        uploads.push(Upload {
+            name: format!("{name}.tar"),
+            file: write_tar(&loose)?,
+            num_files: loose.len(),
+        });
+    }
+    if uploads.is_empty() {
+        bail!("there are no scans (.obj, .ply, .npy) in what was given");
+    }
+    Ok(uploads)
+}
+
+/// Files, each with its name in it, as an archive.
+pub fn write_tar(files: &[(PathBuf, PathBuf)]) -> anyhow::Result<File> {
     let mut builder = tar::Builder::new(tempfile::tempfile()?);
     for (path, name) in files {
         let mut file = open(path)?;

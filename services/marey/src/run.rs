@@ -9,7 +9,7 @@ use crate::{
     marker_sets, watch,
 };
 
-/// Reconstruct a session's motion
+/// Reconstruct a session: motion from control points, or a body from what cameras saw
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey run \"take 3\" --database walks --watch
@@ -17,13 +17,33 @@ use crate::{
   marey run \"take 3\" --database walks --map plug-in-gait
   marey run \"take 3\" --database walks --map map.toml            (see `marey markers --write`)
   marey run \"take 3\" --database walks --map LWRA=left_wrist --map RWRA=right_wrist
-  marey run \"take 3\" --database walks --set chunk_frames=1200")]
+  marey run \"take 3\" --database walks --set chunk_frames=1200
+  marey run \"take 4\" --watch                                  (a session with cameras)
+  marey run \"take 4\" --cameras cam01,cam02,cam03 --camera GX010042.MP4=cam01")]
 pub struct Args {
     /// The session: its name or id
     session: String,
-    /// Motion database to learn from: NAME (its latest version) or NAME@VERSION
+    /// Motion database to learn from: NAME (its latest version) or NAME@VERSION; needed for control points
     #[arg(long, short)]
-    database: String,
+    database: Option<String>,
+    /// Body model, for cameras: NAME (its latest version) or NAME@VERSION [default: shipped]
+    #[arg(long, value_name = "NAME", help_heading = "Cameras")]
+    body_model: Option<String>,
+    /// Cameras to use, separated by commas [default: all with pictures]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", help_heading = "Cameras")]
+    cameras: Vec<String>,
+    /// Which camera a file is of, where its name doesn't tell: FILE=CAMERA; may be given often
+    #[arg(long = "camera", value_name = "FILE=CAMERA", help_heading = "Cameras")]
+    camera_files: Vec<String>,
+    /// How the person is told from the background: auto, plate, adaptive or mixture [default: auto, the plate if there is one]
+    #[arg(long, help_heading = "Cameras")]
+    background: Option<String>,
+    /// Metres of one unit of the calibration, where the file doesn't say it
+    #[arg(long, value_name = "METRES", help_heading = "Cameras")]
+    calibration_unit: Option<f64>,
+    /// sparse or multi-view, where a session has control points and cameras
+    #[arg(long, value_parser = ["sparse", "multi-view"])]
+    kind: Option<String>,
     /// Control points to use, separated by commas [default: all in the file]
     #[arg(long, value_delimiter = ',')]
     points: Vec<String>,
@@ -34,7 +54,8 @@ pub struct Args {
     /// What the names of the performer's markers begin with, where a file has several people: Anna:
     #[arg(long, value_name = "PREFIX")]
     prefix: Option<String>,
-    /// Axis of a TRC or C3D file that points up: x, y or z [default: what the file says, else y for TRC, z for C3D]
+    /// Axis of a TRC or C3D file, or of a calibration, that points up: x, y or z [default: what the file says, else y for TRC,
+    /// z for C3D]
     #[arg(long, value_parser = ["x", "y", "z"])]
     up: Option<String>,
     /// Metres of one unit of BVH files [default: 0.01, centimetres]
@@ -72,7 +93,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         for warning in warnings(&client, &run.id)? {
             eprintln!("warning: {warning}");
         }
-        println!("done; download the motion with\n  marey results {} -o FOLDER", run.id);
+        println!("done; download the results with\n  marey results {} -o FOLDER", run.id);
     }
     Ok(())
 }
@@ -85,8 +106,18 @@ fn warnings(client: &Client, run: &str) -> anyhow::Result<Vec<String>> {
 }
 
 fn request(args: &Args) -> anyhow::Result<Value> {
-    let mut request = json!({ "motion_database": args.database });
+    let mut request = json!({});
     let named = [
+        ("motion_database", args.database.as_ref().map(|name| json!(name))),
+        ("kind", args.kind.as_ref().map(|kind| json!(kind))),
+        ("body_model", args.body_model.as_ref().map(|name| json!(name))),
+        ("cameras", (!args.cameras.is_empty()).then(|| json!(args.cameras))),
+        (
+            "camera_files",
+            (!args.camera_files.is_empty()).then(|| pairs(&args.camera_files, |name| name.into())).transpose()?,
+        ),
+        ("background", args.background.as_ref().map(|kind| json!(kind))),
+        ("metres_per_unit", args.calibration_unit.map(Value::from)),
         ("points", (!args.points.is_empty()).then(|| json!(args.points))),
         ("marker_prefix", args.prefix.as_ref().map(|prefix| json!(prefix))),
         ("up", args.up.as_ref().map(|axis| json!(axis))),

@@ -21,6 +21,11 @@ pub enum Service {
     /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50052), MAREY_WORKER_CONCURRENCY and others
     /// may be.
     Reconstruction,
+    /// Learns body models, makes silhouettes, finds pose and shape in them
+    ///
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50053), MAREY_WORKER_CONCURRENCY and others
+    /// may be. Videos need the program ffmpeg and room for a copy in TMPDIR.
+    ShapeInit,
 }
 
 /// Runs `marey serve` until SIGTERM or SIGINT.
@@ -41,6 +46,10 @@ pub fn run(which: &Service) -> anyhow::Result<()> {
             Service::Reconstruction => {
                 let config = service::Config::from_variables(&variables, reconstruction::DEFAULT_LISTEN)?;
                 Ok(reconstruction::run(config, shutdown).await?)
+            }
+            Service::ShapeInit => {
+                let config = service::Config::from_variables(&variables, shape_init::DEFAULT_LISTEN)?;
+                Ok(shape_init::run(config, shutdown).await?)
             }
         }
     })

@@ -62,13 +62,14 @@ fn list(client: &Client) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What the run is about: a session or a motion database.
+/// What the run is about: a session, a motion database or a body model.
 fn subject(run: &Run) -> String {
     match run.parameters["session_name"].as_str() {
         Some(name) => name.to_owned(),
         None => {
-            let database = &run.parameters["motion_database"];
-            format!("{}@{}", database["name"].as_str().unwrap_or("?"), database["version"])
+            let of = &run.parameters;
+            let built = if of["body_model"].is_object() { &of["body_model"] } else { &of["motion_database"] };
+            format!("{}@{}", built["name"].as_str().unwrap_or("?"), built["version"])
         }
     }
 }

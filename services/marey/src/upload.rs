@@ -7,24 +7,30 @@ use anyhow::Context;
 use crate::{
     cli::ServerArgs,
     client::{Client, Session, encode},
+    session_files,
 };
 
-/// Upload the files of a session: control points, skeleton, true motion
+/// Upload the files of a session: control points, skeleton, true motion; or calibration, videos, masks, plates
 ///
 /// The control points are a .csv (time,left_wrist_x,left_wrist_y,…; seconds and metres, y up), .trc or .c3d file. The
 /// performer's skeleton, .asf or .bvh, is optional: without it the motion database's is used. A true motion (.amc, .bvh), if
 /// there is one, is for measuring the error.
+///
+/// For cameras: a calibration (.toml, .json, .yml, .xml, .qca.txt), and of every camera a video, or pictures or masks in a
+/// folder or archive, named after the camera; pictures of the empty scene as cam01.plate.png or in a folder plates/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey upload \"take 3\" points.csv skeleton.asf
-  marey upload \"take 3\" rig.bvh --role skeleton")]
+  marey upload \"take 3\" rig.bvh --role skeleton
+  marey upload \"take 4\" calib.toml cam*.mp4 plates/")]
 pub struct Args {
     /// The session: its name or id; made if there is none
     session: String,
-    /// Files to upload
+    /// Files to upload, or folders of pictures
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// What the files are for: skeleton, control-points, ground-truth [default: by extension]
+    /// What the files are for: skeleton, control-points, ground-truth, calibration, video, images, masks, plate [default: by
+    /// extension]
     #[arg(long)]
     role: Option<String>,
     /// Name of the file there, when it is only one [default: its own]
@@ -46,11 +52,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             session
         }
     };
-    for path in &args.files {
-        let own = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let name = args.name.clone().unwrap_or(own);
-        let file = File::open(path).with_context(|| path.display().to_string())?;
-        put(&client, &session, &name, args.role.as_deref(), file)?;
+    for found in session_files::gather(&args.files)? {
+        let name = args.name.clone().unwrap_or(found.name);
+        put(&client, &session, &name, args.role.as_deref().or(found.role), found.file)?;
     }
     Ok(())
 }

@@ -1,0 +1,113 @@
+//! What to upload for a session: files as they are, folders of pictures packed, plates renamed.
+
+use std::{
+    fs::File,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, bail};
+
+use crate::pack;
+
+/// A file of a session, ready to be sent.
+#[derive(Debug)]
+pub struct SessionFile {
+    /// its name there
+    pub name: String,
+    /// what it is for, where its name doesn't tell
+    pub role: Option<&'static str>,
+    /// its content
+    pub file: File,
+}
+
+const PICTURES: [&str; 3] = [".png", ".jpg", ".jpeg"];
+
+/// Files as they are; of folders: `plates` as plates of the cameras that its files are named after, others packed as frames.
+pub fn gather(paths: &[PathBuf]) -> anyhow::Result<Vec<SessionFile>> {
+    let mut found = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            found.extend(of_folder(path)?);
+            continue;
+        }
+        let own = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        // the shell gives the files of plates/*
+        let is_plate = path.parent().is_some_and(|folder| is_named(folder, &["plate"])) && is_picture(&own);
+        let (name, role) = if is_plate { (plate_name(&own), Some("plate")) } else { (own, None) };
+        found.push(SessionFile { name, role, file: open(path)? });
+    }
+    Ok(found)
+}
+
+fn of_folder(folder: &Path) -> anyhow::Result<Vec<SessionFile>> {
+    let mut pictures = Vec::new();
+    pack::collect_where(folder, folder, &is_picture, &mut pictures)?;
+    if pictures.is_empty() {
+        bail!("{} holds no pictures (.png, .jpg); name the files themselves", folder.display());
+    }
+    pictures.sort_by(|a, b| a.1.cmp(&b.1));
+    if is_named(folder, &["plate", "background"]) {
+        return pictures
+            .iter()
+            .map(|(path, name)| {
+                let own = name.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                Ok(SessionFile { name: plate_name(&own), role: Some("plate"), file: open(path)? })
+            })
+            .collect();
+    }
+    let role = if is_named(folder, &["image", "frame", "photo", "rgb"]) { "images" } else { "masks" };
+    let canonical = folder.canonicalize().with_context(|| folder.display().to_string())?;
+    let stem = canonical.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let file = pack::write_tar(&pictures)?;
+    Ok(vec![SessionFile { name: format!("{stem}.tar"), role: Some(role), file }])
+}
+
+/// `cam01.png` as `cam01.plate.png`, so that it is not taken for another file of the camera.
+fn plate_name(name: &str) -> String {
+    match name.rsplit_once('.') {
+        Some((stem, ending)) if !stem.to_ascii_lowercase().ends_with("plate") => {
+            format!("{stem}.plate.{ending}")
+        }
+        _ => name.to_owned(),
+    }
+}
+
+fn is_picture(name: &str) -> bool {
+    let lower = name.to_ascii_lowercase();
+    PICTURES.iter().any(|ending| lower.ends_with(ending))
+}
+
+fn is_named(folder: &Path, words: &[&str]) -> bool {
+    let name = folder.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    words.iter().any(|word| name.contains(word))
+}
+
+fn open(path: &Path) -> anyhow::Result<File> {
+    File::open(path).with_context(|| path.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_become_plates_or_archives_of_frames() -> anyhow::Result<()> {
+        let folder = tempfile::tempdir()?;
+        for name in ["plates/cam1.png", "silhouettes/cam1/0000.png", "images/cam1/0000.jpg"] {
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().context("a folder")?)?;
+            std::fs::write(path, "x")?;
+        }
+        let paths = ["plates", "silhouettes", "images"].map(|name| folder.path().join(name));
+        let found: Vec<_> = gather(&paths)?.into_iter().map(|file| (file.name, file.role)).collect();
+        let expected = [
+            ("cam1.plate.png".to_owned(), Some("plate")),
+            ("silhouettes.tar".to_owned(), Some("masks")),
+            ("images.tar".to_owned(), Some("images")),
+        ];
+        assert_eq!(found, expected);
+        let single = gather(&[folder.path().join("plates/cam1.png")])?;
+        assert_eq!((single[0].name.as_str(), single[0].role), ("cam1.plate.png", Some("plate")));
+        Ok(())
+    }
+}
