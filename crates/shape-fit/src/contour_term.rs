@@ -29,15 +29,30 @@ pub struct Weighting {
 /// A body in a pose, with what its derivatives need.
 #[derive(Debug, Clone, Default)]
 pub struct PosedBody {
+    /// the body at rest; without one there are no derivatives
     pub shape: Option<Shape>,
+    /// the body in its pose, all vertices
     pub posed: Posed,
+    /// how bones shift with the shape; only looked at for derivatives with respect to the shape
     pub drift: ShapeDrift,
+}
+
+impl PosedBody {
+    /// Poses the body; the drift stays as it was.
+    ///
+    /// # Panics
+    /// As [`Shape::pose`].
+    pub fn pose(&mut self, model: &BodyModel, pose: &[f64]) {
+        if let Some(shape) = &self.shape {
+            shape.pose(model, pose, &mut self.posed);
+        }
+    }
 }
 
 /// Half a quadratic energy: `½ xᵀ H x + gᵀ x` with half its value.
 #[derive(Debug, Clone)]
 pub struct Quadratic {
-    /// JᵀJ and, in the last column, Jᵀr; shape `[n + 1, n + 1]`
+    /// JᵀJ and, in the last column, Jᵀr, row-major, shape `[n + 1, n + 1]`
     pub product: Vec<f64>,
     /// robust energy
     pub energy: f64,
@@ -65,18 +80,26 @@ const REACH_PX: f64 = 1.5;
 /// What all views share.
 #[derive(Clone, Copy)]
 pub struct Term<'a> {
+    /// whose body it is
     pub model: &'a BodyModel,
+    /// of the model's faces
     pub topology: &'a Topology,
+    /// in the pose at which the energy is wanted
     pub body: &'a PosedBody,
+    /// how distances count
     pub weighting: Weighting,
+    /// coefficients of the shape with respect to which derivatives are taken, after those of the pose: 0 for a shape that
+    /// is known
+    pub components: usize,
+    /// what the silhouettes are worth
     pub options: &'a Options,
 }
 
 impl Term<'_> {
-    /// Energy and derivatives of a view with respect to pose and shape.
+    /// Energy and derivatives of a view with respect to pose and shape; pairs are made anew.
     pub fn evaluate(&self, level: &Level, scratch: &mut Scratch) -> Quadratic {
         let energy = self.gather(level, scratch);
-        let width = self.model.rig().num_dofs() + self.model.num_components();
+        let width = self.model.rig().num_dofs() + self.components;
         let columns = width + 1;
         let mut product = vec![0.0; columns * columns];
         scratch.block.resize(columns * columns, 0.0);
@@ -180,7 +203,9 @@ impl Term<'_> {
         for (vertex, out) in vertices.into_iter().zip(out.chunks_exact_mut(width)) {
             let (by_pose, by_shape) = out.split_at_mut(dofs);
             self.body.posed.vertex_by_pose(self.model, shape, vertex as usize, by_pose);
-            self.body.posed.vertex_by_shape(self.model, &self.body.drift, vertex as usize, by_shape);
+            if !by_shape.is_empty() {
+                self.body.posed.vertex_by_shape(self.model, &self.body.drift, vertex as usize, by_shape);
+            }
         }
     }
 }
@@ -218,8 +243,14 @@ mod tests {
         find_rim(&view, &body.posed.vertices, &topology, &drawn, REACH_PX, &mut rim);
         assert!(rim.len() > 200, "{} points", rim.len());
         let weighting = Weighting { scale_m: 0.1, tangential: 0.1, normal_m: 0.1 };
-        let term =
-            Term { model: &model, topology: &topology, body: &body, weighting, options: &Options::default() };
+        let term = Term {
+            model: &model,
+            topology: &topology,
+            body: &body,
+            weighting,
+            components: model.num_components(),
+            options: &Options::default(),
+        };
         let chosen: Vec<&RimPoint> = rim.iter().step_by(rim.len() / 12).collect();
         let mut jacobian = Vec::new();
         let mut derivatives = vec![Vector3::zeros(); 2 * width];

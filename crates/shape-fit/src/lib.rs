@@ -24,10 +24,14 @@ mod start_poses;
 mod starts;
 
 pub use cleaning::cleaned;
+pub use contour_term::{PosedBody, Quadratic, Scratch, Term, Weighting};
 pub use error::Error;
 pub use fit::{Fit, ViewFit, fit, fit_frames};
+pub use observation::{Level, Observation, Outline};
 pub use options::Options;
 pub use overlay::draw_outline;
+pub use prior_term::add_limits;
+pub use start_poses::{ARMS, LEGS, WHOLE, limb_dofs, set_limb};
 
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

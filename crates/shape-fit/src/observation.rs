@@ -16,6 +16,7 @@ const LEAST_AREA: f64 = 1e-4;
 /// One camera's view of the person.
 #[derive(Debug, Clone)]
 pub struct Observation {
+    /// the camera
     pub camera: Camera,
     /// cleaned, at the camera's resolution
     pub silhouette: Silhouette,
@@ -32,13 +33,16 @@ pub struct Observation {
 /// The contours at one resolution.
 #[derive(Debug, Clone)]
 pub struct Level {
+    /// the camera at that resolution
     pub view: View,
+    /// what it saw
     pub outline: Outline,
 }
 
 /// Points of the contours of a silhouette, pixels of a view, at equal distances.
 #[derive(Debug, Clone, Default)]
 pub struct Outline {
+    /// shape `[points]`
     pub pixels: Vec<Vector2<f64>>,
     /// away from the person, unit vectors
     pub normals: Vec<Vector2<f64>>,
@@ -48,6 +52,9 @@ pub struct Outline {
 
 impl Observation {
     /// Cleans and measures a silhouette; `None` if nobody is in it.
+    ///
+    /// # Errors
+    /// [`Error::Camera`], or [`Error::Size`] if silhouette and camera don't go together.
     pub fn new(camera: &Camera, silhouette: &Silhouette) -> Result<Option<Self>> {
         camera.check()?;
         let found = [silhouette.width(), silhouette.height()];

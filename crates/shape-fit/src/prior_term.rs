@@ -17,6 +17,15 @@ pub fn add_pose(model: &BodyModel, pose: &[f64], mut add: impl FnMut(usize, f64,
         let weight = sigma.powi(-2);
         energy += weight * pose[d] * pose[d];
         add(d, weight, weight * pose[d]);
+    }
+    energy + add_limits(model, pose, add)
+}
+
+/// Adds the energy of what is beyond the limits of joints, as one signed excess a limit (MM eq. 14), `Σ (excess / 3°)²`; its
+/// halved derivatives as `add(dof, weight, slope)`.
+pub fn add_limits(model: &BodyModel, pose: &[f64], mut add: impl FnMut(usize, f64, f64)) -> f64 {
+    let mut energy = 0.0;
+    for (d, dof) in model.rig().dofs().iter().enumerate().skip(ROOT_DOFS) {
         let Some([low, high]) = dof.limits else { continue };
         // signed: positive above, negative below
         let excess = (pose[d] - high).max(0.0) + (pose[d] - low).min(0.0);

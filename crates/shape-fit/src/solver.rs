@@ -172,6 +172,7 @@ impl Problem<'_> {
                     topology: self.topology,
                     body: &body,
                     weighting: stage.weighting,
+                    components: self.model.num_components(),
                     options: &self.options,
                 };
                 let evaluate = |scratch: &mut Scratch, view: &&Observation| {
