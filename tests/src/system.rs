@@ -76,6 +76,13 @@ impl System {
         })
     }
 
+    /// A gateway and one shape-init of so many jobs at once, in this process.
+    pub fn with_shape_init(workers: usize) -> anyhow::Result<Self> {
+        let mut system = Self::start()?;
+        system.start_shape_init(workers)?;
+        Ok(system)
+    }
+
     /// A gateway, one motion-index and one reconstruction of so many jobs at once, in this process.
     pub fn with_services(workers: usize) -> anyhow::Result<Self> {
         let mut system = Self::start()?;
@@ -97,6 +104,13 @@ impl System {
         let service = self.runtime()?.block_on(reconstruction::start(config, shutdown))?;
         self.replicas.set(service.address);
         self.services.push(service);
+        Ok(())
+    }
+
+    /// Starts a shape-init in this process, of so many jobs at once.
+    pub fn start_shape_init(&mut self, workers: usize) -> anyhow::Result<()> {
+        let (config, shutdown) = (self.service_config(workers), self.shutdown.clone());
+        self.services.push(self.runtime()?.block_on(shape_init::start(config, shutdown))?);
         Ok(())
     }
 

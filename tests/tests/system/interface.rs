@@ -157,6 +157,8 @@ fn the_description_is_openapi_3_1_and_lists_every_route() -> Result<()> {
     }
     found.sort();
     let expected = [
+        "DELETE /v1/body-models/{body_model}",
+        "DELETE /v1/body-models/{body_model}/files/{name}",
         "DELETE /v1/motion-databases/{motion_database}",
         "DELETE /v1/motion-databases/{motion_database}/files/{name}",
         "DELETE /v1/sessions/{session_id}",
@@ -164,6 +166,11 @@ fn the_description_is_openapi_3_1_and_lists_every_route() -> Result<()> {
         "GET /healthz",
         "GET /metrics",
         "GET /readyz",
+        "GET /v1/body-models",
+        "GET /v1/body-models/{body_model}",
+        "GET /v1/body-models/{body_model}/body.glb",
+        "GET /v1/body-models/{body_model}/files",
+        "GET /v1/body-models/{body_model}/model",
         "GET /v1/live",
         "GET /v1/me",
         "GET /v1/motion-databases",
@@ -180,12 +187,15 @@ fn the_description_is_openapi_3_1_and_lists_every_route() -> Result<()> {
         "GET /v1/sessions/{session_id}/files",
         "GET /v1/sessions/{session_id}/files/{name}",
         "GET /v1/sessions/{session_id}/runs",
+        "POST /v1/body-models",
+        "POST /v1/body-models/{body_model}/build",
         "POST /v1/motion-databases",
         "POST /v1/motion-databases/{motion_database}/build",
         "POST /v1/motion-databases/{motion_database}/train",
         "POST /v1/runs/{run_id}/cancel",
         "POST /v1/sessions",
         "POST /v1/sessions/{session_id}/runs",
+        "PUT /v1/body-models/{body_model}/files/{name}",
         "PUT /v1/motion-databases/{motion_database}/files/{name}",
         "PUT /v1/sessions/{session_id}/files/{name}",
     ];

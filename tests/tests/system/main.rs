@@ -1,6 +1,8 @@
 //! The whole system as its users meet it: real services, a real PostgreSQL, real HTTP.
 
 mod access;
+mod bodies;
+mod cameras;
 mod command;
 mod databases;
 mod downloads;
