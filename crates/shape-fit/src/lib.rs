@@ -30,7 +30,7 @@ pub use fit::{Fit, ViewFit, fit, fit_frames};
 pub use observation::{Level, Observation, Outline};
 pub use options::Options;
 pub use overlay::draw_outline;
-pub use prior_term::add_limits;
+pub use prior_term::{add_limits, add_pose};
 pub use start_poses::{ARMS, LEGS, WHOLE, limb_dofs, set_limb};
 
 /// Result of the fallible functions of this crate.

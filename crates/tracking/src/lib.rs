@@ -1,0 +1,41 @@
+//! A person's pose followed through the calibrated silhouettes of several cameras (method §5; MM §4), the shape being known.
+//!
+//! [`Tracker`] takes frame after frame: the pose is predicted, fitted to the contours ([`Tracker::refine`]), judged limb by
+//! limb ([`Misalignment`]), and searched for by particles where limbs are misaligned ([`Tracker::search`]), then fitted again.
+//! [`track_chunk`] does so for a run of frames that begins with a key frame of its own, [`merge`] puts such runs together.
+//! The method, its thresholds, and what it was measured to do are in `docs/tracking.md`.
+//!
+//! Metres, radians, y up. Results depend on the seed and on what was seen, not on the number of threads.
+
+mod chunk;
+mod error;
+mod joint_limit_term;
+mod local;
+mod misalignment;
+mod observed_frame;
+mod options;
+mod particles;
+mod parzen_term;
+mod predict;
+mod prediction_term;
+mod random;
+mod silhouette_term;
+mod tracker;
+mod training_poses;
+
+pub use chunk::{Chunk, ChunkPlan, Merged, Seam, merge, plan_chunks, track_chunk};
+pub use error::Error;
+pub use joint_limit_term::joint_limit_energy;
+pub use misalignment::{LimbError, Misalignment};
+pub use observed_frame::ObservedFrame;
+pub use options::{Annealing, Options, Part, ParticleOptions};
+pub use particles::Search;
+pub use parzen_term::Parzen;
+pub use predict::{blended, predicted};
+pub use prediction_term::PoseSpace;
+pub use silhouette_term::SilhouetteTerm;
+pub use tracker::{Stage, Tracked, Tracker};
+pub use training_poses::built_in_poses;
+
+/// Result of the fallible functions of this crate.
+pub type Result<T> = std::result::Result<T, Error>;

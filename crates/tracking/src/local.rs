@@ -1,0 +1,182 @@
+//! Local optimisation: Levenberg–Marquardt over the pose with new correspondences at every step.
+
+use body::{BodyModel, Shape};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use shape_fit::{PosedBody, Quadratic, Scratch, Term, Weighting, add_pose};
+use vision::Topology;
+
+use crate::ObservedFrame;
+
+/// One step from coarse to fine.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    /// resolution: index of the observation's level
+    level: usize,
+    weighting: Weighting,
+    evaluations: usize,
+}
+
+const fn step(level: usize, scale_m: f64, tangential: f64, normal_m: f64, evaluations: usize) -> Step {
+    Step { level, weighting: Weighting { scale_m, tangential, normal_m }, evaluations }
+}
+
+/// Limbs move by up to 20 cm from frame to frame: far first, then exactly.
+const STEPS: [Step; 5] = [
+    step(0, 0.25, 0.5, 0.15, 4),
+    step(0, 0.12, 0.3, 0.10, 5),
+    step(0, 0.06, 0.1, 0.06, 5),
+    step(0, 0.03, 0.03, 0.05, 5),
+    step(1, 0.02, 0.01, 0.04, 4),
+];
+/// Standard deviations of angles and of twists about the prediction, radians: wide, for what no silhouette tells.
+const ANGLE: f64 = 0.5;
+const TWIST: f64 = 0.25;
+/// Steps are shortened so that no angle (radians) or coordinate (metres) changes by more.
+const LONGEST: f64 = 0.4;
+/// Relative gain of energy below which a step is over.
+const LEAST_GAIN: f64 = 2e-3;
+
+/// Buffers of the optimisation, and the body that it poses.
+#[derive(Debug)]
+pub struct Local {
+    /// the body in the pose that was evaluated last
+    pub body: PosedBody,
+    /// of every view
+    scratches: Vec<Scratch>,
+}
+
+/// What doesn't change while a pose is fitted.
+#[derive(Clone, Copy)]
+pub struct Problem<'a> {
+    pub model: &'a BodyModel,
+    pub topology: &'a Topology,
+    pub frame: &'a ObservedFrame,
+    pub predicted: &'a [f64],
+    pub options: &'a shape_fit::Options,
+}
+
+struct System {
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+    energy: f64,
+}
+
+impl Local {
+    /// For a body at rest.
+    pub fn new(shape: Shape) -> Self {
+        let body = PosedBody { shape: Some(shape), ..PosedBody::default() };
+        Self { body, scratches: Vec::new() }
+    }
+
+    /// The pose near the best of several starts. `goes_on` is asked before every evaluation.
+    pub fn refine(
+        &mut self,
+        problem: &Problem<'_>,
+        starts: &[&[f64]],
+        goes_on: &dyn Fn() -> bool,
+    ) -> Option<Vec<f64>> {
+        let mut best: Option<(Vec<f64>, System)> = None;
+        for start in starts {
+            let system = self.linearise(problem, start, &STEPS[0]);
+            if best.as_ref().is_none_or(|(_, best)| system.energy < best.energy) {
+                best = Some((start.to_vec(), system));
+            }
+        }
+        let (mut pose, system) = best?;
+        let mut known = Some(system);
+        for step in &STEPS {
+            let system = known.take().unwrap_or_else(|| self.linearise(problem, &pose, step));
+            pose = self.descend(problem, pose, system, step, goes_on)?;
+        }
+        Some(pose)
+    }
+
+    fn descend(
+        &mut self,
+        problem: &Problem<'_>,
+        mut pose: Vec<f64>,
+        mut system: System,
+        step: &Step,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Option<Vec<f64>> {
+        let (mut damping, mut refused) = (1e-3, 0);
+        for _ in 1..step.evaluations {
+            if !goes_on() {
+                return None;
+            }
+            let Some(next) = moved(&pose, &system, damping) else { break };
+            let next_system = self.linearise(problem, &next, step);
+            if next_system.energy < system.energy {
+                let gain = (system.energy - next_system.energy) / system.energy;
+                (pose, system) = (next, next_system);
+                damping = (damping * 0.3).max(1e-6);
+                if gain < LEAST_GAIN {
+                    break;
+                }
+            } else {
+                damping = (damping * 10.0).max(1e-2);
+                refused += 1;
+                if refused == 2 {
+                    break;
+                }
+            }
+        }
+        Some(pose)
+    }
+
+    /// Half the Hessian (Gauss–Newton), half the gradient, and the energy.
+    fn linearise(&mut self, problem: &Problem<'_>, pose: &[f64], step: &Step) -> System {
+        let Problem { model, topology, frame, predicted, options } = *problem;
+        self.body.pose(model, pose);
+        self.scratches.resize_with(frame.views.len().max(self.scratches.len()), Scratch::default);
+        let weighting = step.weighting;
+        let term = Term { model, topology, body: &self.body, weighting, components: 0, options };
+        let evaluate = |(view, scratch): (&crate::observed_frame::ObservedView, &mut Scratch)| {
+            term.evaluate(&view.observation.levels[step.level], scratch)
+        };
+        let found: Vec<Quadratic> = frame.views.par_iter().zip(&mut self.scratches).map(evaluate).collect();
+        let dofs = pose.len();
+        let mut system =
+            System { matrix: DMatrix::zeros(dofs, dofs), gradient: DVector::zeros(dofs), energy: 0.0 };
+        // in the order of the views, whatever thread they came from
+        for Quadratic { product, energy } in found {
+            system.energy += energy;
+            for i in 0..dofs {
+                for j in 0..dofs {
+                    system.matrix[(i, j)] += product[i * (dofs + 1) + j];
+                }
+                system.gradient[i] += product[i * (dofs + 1) + dofs];
+            }
+        }
+        let System { matrix, gradient, energy } = &mut system;
+        *energy += add_pose(model, pose, |d, weight, slope| {
+            matrix[(d, d)] += weight;
+            gradient[d] += slope;
+        });
+        for (d, dof) in model.rig().dofs().iter().enumerate().skip(body::ROOT_DOFS) {
+            let weight = if dof.name.ends_with("twist") { TWIST } else { ANGLE }.powi(-2);
+            let miss = pose[d] - predicted[d];
+            *energy += weight * miss * miss;
+            matrix[(d, d)] += weight;
+            gradient[d] += weight * miss;
+        }
+        system
+    }
+}
+
+fn moved(pose: &[f64], system: &System, damping: f64) -> Option<Vec<f64>> {
+    let mut matrix = system.matrix.clone();
+    for i in 0..matrix.nrows() {
+        matrix[(i, i)] = matrix[(i, i)] * (1.0 + damping) + 1e-9;
+    }
+    let mut step = matrix.cholesky()?.solve(&system.gradient);
+    let longest = step.amax();
+    if !longest.is_finite() {
+        return None;
+    }
+    if longest > LONGEST {
+        step *= LONGEST / longest;
+    }
+    Some(pose.iter().zip(step.iter()).map(|(x, step)| x - step).collect())
+}

@@ -1,0 +1,65 @@
+use model::{Camera, Silhouette};
+use rayon::prelude::*;
+use shape_fit::Observation;
+use vision::{Observed, View, reduced};
+
+use crate::{Error, Result};
+
+/// Height of the person in the views that particles are drawn in, pixels.
+const HEIGHT_PX: f64 = 160.0;
+
+/// What all cameras saw at one moment, cleaned and made ready for every step.
+#[derive(Debug, Clone)]
+pub struct ObservedFrame {
+    /// number of the frame in the session
+    pub index: usize,
+    /// of the cameras that see somebody
+    pub(crate) views: Vec<ObservedView>,
+    num_cameras: usize,
+}
+
+/// One camera that sees somebody.
+#[derive(Debug, Clone)]
+pub(crate) struct ObservedView {
+    /// index of the camera among those of the frame
+    pub camera: usize,
+    /// contours, coarse and fine
+    pub observation: Observation,
+    /// the view that particles are drawn in
+    pub reduced: View,
+    /// what was seen, in that view
+    pub observed: Observed,
+}
+
+impl ObservedFrame {
+    /// Prepares the silhouettes of a frame, on all cores; cameras that see nobody are left out.
+    ///
+    /// # Errors
+    /// [`Error::View`] for the first camera whose silhouette has another size or whose calibration can't be.
+    pub fn new(index: usize, views: &[(Camera, Silhouette)]) -> Result<Self> {
+        let prepare = |(camera, (calibration, silhouette)): (usize, &(Camera, Silhouette))| {
+            let Some(observation) = Observation::new(calibration, silhouette)? else { return Ok(None) };
+            let height = observation.silhouette.bounds().map_or(1, |[_, top, _, bottom]| bottom - top);
+            let scale = ((height as f64 / HEIGHT_PX).round() as usize).max(1);
+            let reduced_view = View::reduced(calibration, scale);
+            let observed = Observed::new(reduced(&observation.silhouette, scale));
+            Ok(Some(ObservedView { camera, observation, reduced: reduced_view, observed }))
+        };
+        let prepared: Vec<_> = views.par_iter().enumerate().map(prepare).collect();
+        let mut found = Vec::with_capacity(views.len());
+        for view in prepared {
+            found.extend(view.map_err(|source| Error::View { frame: index, source })?);
+        }
+        Ok(Self { index, views: found, num_cameras: views.len() })
+    }
+
+    /// Number of cameras that see somebody.
+    pub fn num_views(&self) -> usize {
+        self.views.len()
+    }
+
+    /// Number of all cameras.
+    pub fn num_cameras(&self) -> usize {
+        self.num_cameras
+    }
+}

@@ -1,0 +1,274 @@
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use body::{BodyModel, Posed};
+use model::Silhouette;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use vision::{Rasteriser, Topology, View};
+
+use crate::{
+    Error, Misalignment, ObservedFrame, Options, Part, Parzen, PoseSpace, Result, Search, built_in_poses,
+    local::{Local, Problem},
+    misalignment::Judge,
+    particles::{Particles, Space},
+    predicted,
+};
+
+/// What gave a frame its pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// nobody was seen: the pose is the one before
+    Unseen,
+    /// local optimisation
+    Local,
+    /// particles, and local optimisation after them: nothing is misaligned any more
+    Particles,
+    /// limbs are misaligned, whatever was tried
+    Misaligned,
+}
+
+/// The pose of a frame and how well it fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracked {
+    /// number of the frame in the session
+    pub frame: usize,
+    /// root translation (metres), rotation vector and angles (radians), shape `[dofs]`
+    pub pose: Vec<f64>,
+    /// joints in their pose, metres, in the order of the model's rig
+    pub joints: Vec<Vector3<f64>>,
+    /// intersection over union of the body and each camera's cleaned silhouette, `None` where nobody was seen, shape
+    /// `[cameras]`
+    pub ious: Vec<Option<f64>>,
+    /// how every limb fits
+    pub misalignment: Misalignment,
+    /// what gave the pose
+    pub stage: Stage,
+    /// of the particles of the last search, `None` without one
+    pub effective_sample_size: Option<f64>,
+}
+
+impl Tracked {
+    /// Mean of the cameras that see somebody; 0 if none does.
+    pub fn mean_iou(&self) -> f64 {
+        let seen: Vec<f64> = self.ious.iter().flatten().copied().collect();
+        seen.iter().sum::<f64>() / seen.len().max(1) as f64
+    }
+}
+
+/// Follows one person of known shape from frame to frame.
+pub struct Tracker<'a> {
+    model: &'a BodyModel,
+    topology: Topology,
+    options: Options,
+    training_poses: Vec<Vec<f64>>,
+    parzen: Parzen,
+    pose_space: PoseSpace,
+    local: Local,
+    judge: Judge,
+    particles: Particles,
+    before: Vec<f64>,
+    last: Vec<f64>,
+}
+
+impl<'a> Tracker<'a> {
+    /// Begins with a shape (coefficients, standard deviations; missing ones are 0) and the pose of the first frame, with the
+    /// built-in poses as the prior's.
+    ///
+    /// # Errors
+    /// [`Error::Shape`], [`Error::Pose`] or [`Error::Option`] if one of them can't be.
+    pub fn new(model: &'a BodyModel, alpha: &[f64], start: &[f64], options: Options) -> Result<Self> {
+        Self::with_training_poses(model, alpha, start, options, built_in_poses(model))
+    }
+
+    /// The same with training poses of shape `[poses][dofs]`, about a hundred.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), or [`Error::TrainingPoses`].
+    pub fn with_training_poses(
+        model: &'a BodyModel,
+        alpha: &[f64],
+        start: &[f64],
+        options: Options,
+        training_poses: Vec<Vec<f64>>,
+    ) -> Result<Self> {
+        options.check()?;
+        if alpha.len() > model.num_components() || alpha.iter().any(|x| !x.is_finite()) {
+            return Err(Error::Shape { found: alpha.len(), expected: model.num_components() });
+        }
+        check_pose(model, start)?;
+        Ok(Self {
+            model,
+            topology: Topology::new(model.faces(), model.num_vertices()),
+            options,
+            parzen: Parzen::new(model, &training_poses)?,
+            pose_space: PoseSpace::new(model, &training_poses)?,
+            training_poses,
+            local: Local::new(model.shape(alpha)),
+            judge: Judge::default(),
+            particles: Particles::default(),
+            before: start.to_vec(),
+            last: start.to_vec(),
+        })
+    }
+
+    /// Takes up a pose of a frame that wasn't tracked, such as a key frame; there is no velocity then.
+    ///
+    /// # Errors
+    /// [`Error::Pose`] if it is of another rig.
+    pub fn restart(&mut self, pose: &[f64]) -> Result<()> {
+        check_pose(self.model, pose)?;
+        (self.before, self.last) = (pose.to_vec(), pose.to_vec());
+        Ok(())
+    }
+
+    /// The model.
+    pub fn model(&self) -> &'a BodyModel {
+        self.model
+    }
+
+    /// The pose that is expected in the next frame, shape `[dofs]`.
+    pub fn prediction(&self) -> Vec<f64> {
+        predicted(self.model, &self.before, &self.last)
+    }
+
+    /// Tracks the next frame: local optimisation, misalignment, particles only if a limb is misaligned, local optimisation
+    /// again. Inside the frame `stop` is looked at before every iteration.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`] if `stop` became true; the tracker is as before the frame then.
+    pub fn track(&mut self, frame: &ObservedFrame, stop: &AtomicBool) -> Result<Tracked> {
+        let stopped = Error::Stopped { frame: frame.index };
+        if frame.num_views() == 0 {
+            return Ok(self.unseen(frame));
+        }
+        let prediction = self.prediction();
+        let last = self.last.clone();
+        let goes_on = || !stop.load(Ordering::Relaxed);
+        let starts = [prediction.as_slice(), last.as_slice()];
+        let mut pose = self.refine(frame, &prediction, &starts, &goes_on).ok_or(stopped.clone())?;
+        let mut misalignment = self.misalignment(frame, &pose);
+        let (mut stage, mut effective_sample_size) = (Stage::Local, None);
+        if misalignment.any() {
+            if self.options.particles.is_some() {
+                let found = self.search(frame, &prediction, &pose, &misalignment, &goes_on);
+                if let Some(found) = found.ok_or(stopped.clone())? {
+                    effective_sample_size = Some(found.effective_sample_size);
+                    let refined = self.refine(frame, &prediction, &[&found.pose], &goes_on).ok_or(stopped)?;
+                    let after = self.misalignment(frame, &refined);
+                    if after.worst_m() < misalignment.worst_m() {
+                        (pose, misalignment) = (refined, after);
+                    }
+                }
+            }
+            let is_fixed = !misalignment.any();
+            stage = if is_fixed { Stage::Particles } else { Stage::Misaligned };
+        }
+        self.before = std::mem::replace(&mut self.last, pose);
+        Ok(self.tracked(frame, misalignment, stage, effective_sample_size))
+    }
+
+    /// Local optimisation: the pose that a frame's contours pull the best of several starts to, with the prior about
+    /// `prediction`. `None` if `goes_on` said no.
+    pub fn refine(
+        &mut self,
+        frame: &ObservedFrame,
+        prediction: &[f64],
+        starts: &[&[f64]],
+        goes_on: &dyn Fn() -> bool,
+    ) -> Option<Vec<f64>> {
+        let problem = Problem {
+            model: self.model,
+            topology: &self.topology,
+            frame,
+            predicted: prediction,
+            options: &self.options.fit,
+        };
+        self.local.refine(&problem, starts, goes_on)
+    }
+
+    /// How every limb of a pose fits a frame.
+    pub fn misalignment(&mut self, frame: &ObservedFrame, pose: &[f64]) -> Misalignment {
+        self.local.body.pose(self.model, pose);
+        let vertices = &self.local.body.posed.vertices;
+        let errors = self.judge.errors(self.model, &self.topology, frame, vertices);
+        Misalignment::from_errors(errors, self.options.misaligned_m)
+    }
+
+    /// Searches by particles from a pose. `None` if `goes_on` said no; `Some(None)` if there is nothing to search: no DOF moves
+    /// what is misaligned, or [`Options::particles`] is `None`.
+    pub fn search(
+        &mut self,
+        frame: &ObservedFrame,
+        prediction: &[f64],
+        start: &[f64],
+        misalignment: &Misalignment,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Option<Option<Search>> {
+        let Some(options) = &self.options.particles else { return Some(None) };
+        let dofs = match options.part {
+            Part::Misaligned => misalignment.dofs(self.model),
+            Part::Whole => (0..self.model.rig().num_dofs()).collect(),
+        };
+        let Some(shape) = &self.local.body.shape else { return Some(None) };
+        if dofs.is_empty() {
+            return Some(None);
+        }
+        let space = Space {
+            model: self.model,
+            topology: &self.topology,
+            shape,
+            frame,
+            start,
+            predicted: prediction,
+            dofs: &dofs,
+            parzen: &self.parzen,
+            pose_space: &self.pose_space,
+            training_poses: &self.training_poses,
+            options,
+        };
+        self.particles.search(&space, goes_on).map(Some)
+    }
+
+    fn unseen(&mut self, frame: &ObservedFrame) -> Tracked {
+        self.before.clone_from(&self.last);
+        self.tracked(frame, Misalignment::from_errors([0.0; 10], f64::INFINITY), Stage::Unseen, None)
+    }
+
+    /// The last pose as a result.
+    fn tracked(
+        &mut self,
+        frame: &ObservedFrame,
+        misalignment: Misalignment,
+        stage: Stage,
+        effective_sample_size: Option<f64>,
+    ) -> Tracked {
+        self.local.body.pose(self.model, &self.last);
+        let Posed { vertices, joints, .. } = &self.local.body.posed;
+        let draw = |view: &crate::observed_frame::ObservedView| {
+            let mut drawn = Silhouette::empty(0, 0);
+            let full = View::new(&view.observation.camera);
+            Rasteriser::new().silhouette(&full, vertices, &self.topology, &mut drawn);
+            drawn.iou(&view.observation.silhouette)
+        };
+        let found: Vec<f64> = frame.views.par_iter().map(draw).collect();
+        let mut ious = vec![None; frame.num_cameras()];
+        frame.views.iter().zip(found).for_each(|(view, iou)| ious[view.camera] = Some(iou));
+        Tracked {
+            frame: frame.index,
+            pose: self.last.clone(),
+            joints: joints.clone(),
+            ious,
+            misalignment,
+            stage,
+            effective_sample_size,
+        }
+    }
+}
+
+fn check_pose(model: &BodyModel, pose: &[f64]) -> Result<()> {
+    let expected = model.rig().num_dofs();
+    if pose.len() != expected || pose.iter().any(|x| !x.is_finite()) {
+        return Err(Error::Pose { found: pose.len(), expected });
+    }
+    Ok(())
+}

@@ -1,0 +1,103 @@
+//! The capture that judges: 40 frames of a stranger, 8 cameras.
+
+use std::{
+    path::Path,
+    sync::atomic::AtomicBool,
+    time::{Duration, Instant},
+};
+
+use body::BodyModel;
+use formats::{calibration, image_files};
+use model::{Camera, Silhouette};
+use nalgebra::Vector3;
+use serde_json::Value;
+use tracking::{Options, Stage, Tracker, track_chunk};
+use vision::scene::SilhouetteNoise;
+
+const FRAMES: usize = 40;
+
+fn views(folder: &Path, cameras: &[Camera], frame: usize, noise: Option<u64>) -> Vec<(Camera, Silhouette)> {
+    let read = |(index, camera): (usize, &Camera)| {
+        let file = testdata::read(folder, &format!("silhouettes/{}/{frame:04}.png", camera.name));
+        let mut silhouette = image_files::read_silhouette(&file, &Default::default()).unwrap().value;
+        if let Some(seed) = noise {
+            SilhouetteNoise::default().add_to(&mut silhouette, seed + frame as u64, index as u64);
+        }
+        (camera.clone(), silhouette)
+    };
+    cameras.iter().enumerate().map(read).collect()
+}
+
+/// True joints of every frame, in the order of the model's rig.
+fn truth(folder: &Path, model: &BodyModel) -> Vec<Vec<Vector3<f64>>> {
+    let json: Value = serde_json::from_slice(&testdata::read(folder, "groundtruth/joints.json")).unwrap();
+    let names: Vec<&str> =
+        json["joint_names"].as_array().unwrap().iter().map(|n| n.as_str().unwrap()).collect();
+    let frames = json["frames"].as_array().unwrap();
+    let joint = |frame: &Value, name: &str| {
+        let index = names.iter().position(|other| *other == name).unwrap();
+        let at = |axis: usize| frame["joints"][index][axis].as_f64().unwrap();
+        Vector3::new(at(0), at(1), at(2))
+    };
+    let joints = |frame| model.rig().joints().iter().map(|j| joint(frame, &j.name)).collect();
+    frames.iter().map(joints).collect()
+}
+
+/// Limits: mean joint error and largest, mm; least mean intersection over union.
+fn judge(test: &str, wanted: &[usize], noise: Option<u64>, limits: [f64; 3]) {
+    let Some(folder) = testdata::shared("data/multiview/synthetic-8cam", test) else { return };
+    let file = testdata::read(&folder, "calibration.json");
+    let all = calibration::read("calibration.json", &file, &Default::default()).unwrap().value;
+    let cameras: Vec<Camera> = wanted.iter().map(|&index| all[index].clone()).collect();
+    let model = BodyModel::shipped();
+    let truth = truth(&folder, &model);
+    let frames: Vec<_> = (0..FRAMES).map(|frame| views(&folder, &cameras, frame, noise)).collect();
+    let fit = shape_fit::fit(&model, &frames[0], &shape_fit::Options::default()).unwrap();
+    let mut tracker = Tracker::new(&model, &fit.alpha, &fit.pose, Options::default()).unwrap();
+    let (mut before, mut times) = (Instant::now(), Vec::<(Stage, Duration)>::new());
+    let chunk = track_chunk(&mut tracker, 0, &frames, &AtomicBool::new(false), |tracked| {
+        times.push((tracked.stage, before.elapsed()));
+        before = Instant::now();
+    });
+    let chunk = chunk.unwrap();
+    let (mut sum, mut worst, mut iou) = (0.0, 0.0f64, 0.0);
+    for (tracked, truth) in chunk.frames.iter().zip(&truth) {
+        let errors: Vec<f64> =
+            tracked.joints.iter().zip(truth).map(|(a, b)| 1000.0 * (a - b).norm()).collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        let (joint, most) =
+            errors.iter().enumerate().fold((0, 0.0), |most, (i, &e)| if e > most.1 { (i, e) } else { most });
+        println!(
+            "{test} {:2}: {mean:5.1} mm, {:>10} {most:5.1} mm, iou {:.3}, limb {:4.1} mm, {:?} {:.0} ms",
+            tracked.frame,
+            model.rig().joints()[joint].name,
+            tracked.mean_iou(),
+            1000.0 * tracked.misalignment.worst_m(),
+            tracked.stage,
+            times[tracked.frame].1.as_secs_f64() * 1e3
+        );
+        sum += mean / FRAMES as f64;
+        worst = worst.max(most);
+        iou += tracked.mean_iou() / FRAMES as f64;
+    }
+    let is_local = |(stage, _): &&(Stage, Duration)| *stage == Stage::Local;
+    let local: Vec<f64> = times.iter().filter(is_local).map(|(_, time)| time.as_secs_f64() * 1e3).collect();
+    let least = local.iter().copied().fold(f64::INFINITY, f64::min);
+    println!(
+        "{test}: joints {sum:.1} mm, largest {worst:.1} mm, iou {iou:.3}; {} frames locally in {:.0} ms on average, {least:.0} \
+         at best",
+        local.len(),
+        local.iter().sum::<f64>() / local.len().max(1) as f64
+    );
+    assert!(sum <= limits[0] && worst <= limits[1] && iou >= limits[2], "{sum} {worst} {iou}");
+}
+
+#[test]
+fn a_stranger_is_followed_in_eight_views() {
+    judge("a_stranger_is_followed_in_eight_views", &[0, 1, 2, 3, 4, 5, 6, 7], None, [20.0, 100.0, 0.93]);
+}
+
+#[test]
+fn a_stranger_is_followed_in_four_noisy_views() {
+    judge("a_stranger_is_followed_in_four_noisy_views", &[0, 2, 4, 6], Some(5), [35.0, f64::INFINITY, 0.85]);
+}

@@ -1,0 +1,141 @@
+//! People whose motion is known are followed.
+
+mod moving;
+#[path = "../../body/tests/scans/mod.rs"]
+mod scans;
+
+use std::sync::atomic::AtomicBool;
+
+use body::BodyModel;
+use moving::{cameras, distances, mixed, seen};
+use tracking::{Chunk, Error, ObservedFrame, Options, Stage, Tracker, merge, plan_chunks, track_chunk};
+use vision::scene::SilhouetteNoise;
+
+static GO: AtomicBool = AtomicBool::new(false);
+
+/// Follows a registered scan, whose surface is not one of the model's, through a mixed motion, from a start that `shape_fit`
+/// finds. Limits: mean joint error, largest, metres; least intersection over union.
+fn follow(test: &str, subjects: &[usize], views: usize, noise: Option<u64>, limits: [f64; 3]) {
+    let Some(bodies) = testdata::shared("data/bodies", test) else { return };
+    let data = scans::Scans::read(&bodies);
+    let model = BodyModel::shipped();
+    let cameras = cameras(views);
+    for &subject in subjects {
+        let shape = model.shape_of(data.scans[subject].clone()).unwrap();
+        let motion = mixed(&model, 6);
+        let mut frames: Vec<_> = motion.iter().map(|pose| seen(&model, &shape, pose, &cameras)).collect();
+        for (frame, (views, _)) in frames.iter_mut().enumerate() {
+            for (index, (_, silhouette)) in views.iter_mut().enumerate() {
+                if let Some(seed) = noise {
+                    SilhouetteNoise::default().add_to(silhouette, seed + frame as u64, index as u64);
+                }
+            }
+        }
+        let fit = shape_fit::fit(&model, &frames[0].0, &shape_fit::Options::default()).unwrap();
+        let mut tracker = Tracker::new(&model, &fit.alpha, &fit.pose, Options::default()).unwrap();
+        let views = frames.iter().map(|(views, _)| views);
+        let chunk = track_chunk(&mut tracker, 0, views, &GO, |_| ()).unwrap();
+        let (mut sum, mut worst, mut iou) = (0.0, 0.0f64, 1.0f64);
+        for (tracked, (_, truth)) in chunk.frames.iter().zip(&frames) {
+            let mean = distances(&tracked.joints, truth).sum::<f64>() / truth.len() as f64;
+            let most = distances(&tracked.joints, truth).fold(0.0, f64::max);
+            println!(
+                "subject {subject} frame {:2}: {:5.1} mm, worst {:5.1} mm, iou {:.3}, error {:4.1} mm, {:?}",
+                tracked.frame,
+                1000.0 * mean,
+                1000.0 * most,
+                tracked.mean_iou(),
+                1000.0 * tracked.misalignment.worst_m(),
+                tracked.stage
+            );
+            sum += mean / frames.len() as f64;
+            worst = worst.max(most);
+            iou = iou.min(tracked.mean_iou());
+        }
+        println!("subject {subject}: {:.1} mm, worst {:.1} mm, least iou {iou:.3}", 1e3 * sum, 1e3 * worst);
+        assert!(sum < limits[0] && worst < limits[1] && iou > limits[2], "{sum} {worst} {iou}");
+    }
+}
+
+#[test]
+fn scanned_people_are_followed_through_squats_and_turns() {
+    let test = "scanned_people_are_followed_through_squats_and_turns";
+    follow(test, &[17, 60], 8, None, [0.008, 0.05, 0.95]);
+}
+
+#[test]
+fn a_scanned_person_is_followed_in_four_noisy_views() {
+    follow("a_scanned_person_is_followed_in_four_noisy_views", &[33], 4, Some(3), [0.02, 0.15, 0.90]);
+}
+
+#[test]
+fn chunks_tracked_apart_are_one_motion() {
+    let model = BodyModel::shipped();
+    let cameras = cameras(4);
+    let alpha = [0.8, -0.6, 0.5];
+    let shape = model.shape(&alpha);
+    let motion = &mixed(&model, 5)[..16];
+    let frames: Vec<_> = motion.iter().map(|pose| seen(&model, &shape, pose, &cameras)).collect();
+    let chunks: Vec<Chunk> = plan_chunks(frames.len(), 8, 3)
+        .iter()
+        .map(|plan| {
+            let views = frames[plan.first..plan.end].iter().map(|(views, _)| views);
+            let mut tracker = Tracker::new(&model, &alpha, &motion[plan.first], Options::default()).unwrap();
+            track_chunk(&mut tracker, plan.first, views, &GO, |_| ()).unwrap()
+        })
+        .collect();
+    let merged = merge(&model, &shape, &chunks).unwrap();
+    assert_eq!(merged.frames.len(), frames.len());
+    assert!(merged.seams[0].is_smooth, "{:?}", merged.seams);
+    for (tracked, (_, truth)) in merged.frames.iter().zip(&frames) {
+        let most = distances(&tracked.joints, truth).fold(0.0, f64::max);
+        assert!(most < 0.05, "frame {}: {most} m", tracked.frame);
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit_of_local_and_particle_search() {
+    let model = BodyModel::shipped();
+    let shape = model.shape(&[0.4]);
+    let motion = mixed(&model, 5);
+    let (views, _) = seen(&model, &shape, &motion[0], &cameras(4));
+    // from a pose that local optimisation does not come back from
+    let mut start = motion[0].clone();
+    let arm = model.rig().dof_index("l_shoulder_abd").unwrap();
+    start[arm] += 1.9;
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let frame = ObservedFrame::new(3, &views).unwrap();
+            let mut tracker = Tracker::new(&model, &[0.4], &start, Options::default()).unwrap();
+            let misalignment = tracker.misalignment(&frame, &start);
+            assert!(misalignment.any());
+            let found = tracker.search(&frame, &start, &start, &misalignment, &|| true).unwrap().unwrap();
+            assert!(found.effective_sample_size >= 1.0 && found.effective_sample_size <= 25.0);
+            (found, tracker.track(&frame, &GO).unwrap())
+        })
+    };
+    assert_eq!(with(1), with(3));
+}
+
+#[test]
+fn a_stop_is_heard_inside_a_frame_and_an_empty_frame_keeps_the_pose() {
+    let model = BodyModel::shipped();
+    let motion = mixed(&model, 5);
+    let (views, _) = seen(&model, &model.shape(&[]), &motion[0], &cameras(3));
+    let frame = ObservedFrame::new(7, &views).unwrap();
+    let mut tracker = Tracker::new(&model, &[], &motion[0], Options::default()).unwrap();
+    assert_eq!(tracker.track(&frame, &AtomicBool::new(true)), Err(Error::Stopped { frame: 7 }));
+    let tracked = tracker.track(&frame, &GO).unwrap();
+    assert!(tracked.stage == Stage::Local && tracked.mean_iou() > 0.97, "{:?}", tracked.ious);
+    let nobody: Vec<_> = views
+        .into_iter()
+        .map(|(camera, mut silhouette)| {
+            silhouette.clear();
+            (camera, silhouette)
+        })
+        .collect();
+    let unseen = tracker.track(&ObservedFrame::new(8, &nobody).unwrap(), &GO).unwrap();
+    assert_eq!((unseen.stage, unseen.ious, unseen.pose), (Stage::Unseen, vec![None; 3], tracked.pose));
+    assert!(Tracker::new(&model, &[], &[0.0; 3], Options::default()).is_err());
+}
