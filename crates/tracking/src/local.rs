@@ -23,11 +23,11 @@ const fn step(level: usize, scale_m: f64, tangential: f64, normal_m: f64, evalua
 
 /// Limbs move by up to 20 cm from frame to frame: far first, then exactly.
 const STEPS: [Step; 5] = [
-    step(0, 0.25, 0.5, 0.15, 4),
-    step(0, 0.12, 0.3, 0.10, 5),
-    step(0, 0.06, 0.1, 0.06, 5),
-    step(0, 0.03, 0.03, 0.05, 5),
-    step(1, 0.02, 0.01, 0.04, 4),
+    step(0, 0.25, 0.5, 0.15, 3),
+    step(0, 0.12, 0.3, 0.10, 4),
+    step(0, 0.06, 0.1, 0.06, 4),
+    step(0, 0.03, 0.03, 0.05, 4),
+    step(1, 0.02, 0.01, 0.04, 3),
 ];
 /// Standard deviations of angles and of twists about the prediction, radians: wide, for what no silhouette tells.
 const ANGLE: f64 = 0.5;

@@ -67,6 +67,11 @@ impl Misalignment {
         self.limbs.iter().map(|limb| limb.error_m).fold(0.0, f64::max)
     }
 
+    /// Sum of all errors, metres: what is less is the better pose.
+    pub fn total_m(&self) -> f64 {
+        self.limbs.iter().map(|limb| limb.error_m).sum()
+    }
+
     /// Indices of the DOFs that move misaligned limbs: their own, and the twist of the limb above, which only shows in them; all
     /// DOFs if the torso is misaligned.
     pub fn dofs(&self, model: &BodyModel) -> Vec<usize> {

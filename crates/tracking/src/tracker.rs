@@ -4,6 +4,7 @@ use body::{BodyModel, Posed};
 use model::Silhouette;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use shape_fit::limb_dofs;
 use vision::{Rasteriser, Topology, View};
 
 use crate::{
@@ -54,6 +55,16 @@ impl Tracked {
         seen.iter().sum::<f64>() / seen.len().max(1) as f64
     }
 }
+
+/// Ways to search, in the order in which they are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Attempt {
+    AsAsked,
+    LimbByLimb,
+}
+
+/// Limbs are searched one by one where an error is still above this many times the threshold.
+const FAR: f64 = 2.5;
 
 /// Follows one person of known shape from frame to frame.
 pub struct Tracker<'a> {
@@ -149,21 +160,28 @@ impl<'a> Tracker<'a> {
         let mut misalignment = self.misalignment(frame, &pose);
         let (mut stage, mut effective_sample_size) = (Stage::Local, None);
         if misalignment.any() {
-            if self.options.particles.is_some() {
-                let found = self.search(frame, &prediction, &pose, &misalignment, &goes_on);
-                if let Some(found) = found.ok_or(stopped.clone())? {
-                    effective_sample_size = Some(found.effective_sample_size);
-                    let refined = self.refine(frame, &prediction, &[&found.pose], &goes_on).ok_or(stopped)?;
-                    let after = self.misalignment(frame, &refined);
-                    if after.worst_m() < misalignment.worst_m() {
-                        (pose, misalignment) = (refined, after);
-                    }
+            for attempt in [Attempt::AsAsked, Attempt::LimbByLimb] {
+                let is_far = misalignment.worst_m() > FAR * self.options.misaligned_m;
+                if !misalignment.any() || attempt == Attempt::LimbByLimb && !is_far {
+                    break;
+                }
+                let found = self.attempt(frame, &prediction, &pose, &misalignment, attempt, &goes_on);
+                let Some(found) = found.ok_or(stopped.clone())? else { break };
+                effective_sample_size = Some(found.effective_sample_size);
+                let refined = self.refine(frame, &prediction, &[&found.pose], &goes_on);
+                let refined = refined.ok_or(stopped.clone())?;
+                let after = self.misalignment(frame, &refined);
+                if after.total_m() < misalignment.total_m() {
+                    (pose, misalignment) = (refined, after);
                 }
             }
-            let is_fixed = !misalignment.any();
-            stage = if is_fixed { Stage::Particles } else { Stage::Misaligned };
+            stage = if misalignment.any() { Stage::Misaligned } else { Stage::Particles };
         }
         self.before = std::mem::replace(&mut self.last, pose);
+        if stage != Stage::Local {
+            // from a wrong pose to a right one is no velocity
+            self.before.clone_from(&self.last);
+        }
         Ok(self.tracked(frame, misalignment, stage, effective_sample_size))
     }
 
@@ -204,11 +222,49 @@ impl<'a> Tracker<'a> {
         misalignment: &Misalignment,
         goes_on: &dyn Fn() -> bool,
     ) -> Option<Option<Search>> {
-        let Some(options) = &self.options.particles else { return Some(None) };
-        let dofs = match options.part {
+        let part = self.options.particles.map_or(Part::Misaligned, |particles| particles.part);
+        let dofs = match part {
             Part::Misaligned => misalignment.dofs(self.model),
             Part::Whole => (0..self.model.rig().num_dofs()).collect(),
         };
+        self.search_dofs(frame, prediction, start, &dofs, goes_on)
+    }
+
+    /// One way to search: as [`search`](Self::search), or arms and legs one after the other, each from what the one before
+    /// found, for limbs that were blamed for another's error.
+    fn attempt(
+        &mut self,
+        frame: &ObservedFrame,
+        prediction: &[f64],
+        start: &[f64],
+        misalignment: &Misalignment,
+        attempt: Attempt,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Option<Option<Search>> {
+        if attempt == Attempt::AsAsked {
+            return self.search(frame, prediction, start, misalignment, goes_on);
+        }
+        let mut found: Option<Search> = None;
+        for limb in limb_dofs(self.model) {
+            let dofs: Vec<usize> = limb.into_iter().flatten().collect();
+            let from = found.as_ref().map_or(start, |found| &found.pose).to_vec();
+            // the first particle is the start, so that nothing gets worse
+            if let Some(better) = self.search_dofs(frame, prediction, &from, &dofs, goes_on)? {
+                found = Some(better);
+            }
+        }
+        Some(found)
+    }
+
+    fn search_dofs(
+        &mut self,
+        frame: &ObservedFrame,
+        prediction: &[f64],
+        start: &[f64],
+        dofs: &[usize],
+        goes_on: &dyn Fn() -> bool,
+    ) -> Option<Option<Search>> {
+        let Some(options) = &self.options.particles else { return Some(None) };
         let Some(shape) = &self.local.body.shape else { return Some(None) };
         if dofs.is_empty() {
             return Some(None);
@@ -220,7 +276,7 @@ impl<'a> Tracker<'a> {
             frame,
             start,
             predicted: prediction,
-            dofs: &dofs,
+            dofs,
             parzen: &self.parzen,
             pose_space: &self.pose_space,
             training_poses: &self.training_poses,

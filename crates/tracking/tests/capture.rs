@@ -68,13 +68,14 @@ fn judge(test: &str, wanted: &[usize], noise: Option<u64>, limits: [f64; 3]) {
         let (joint, most) =
             errors.iter().enumerate().fold((0, 0.0), |most, (i, &e)| if e > most.1 { (i, e) } else { most });
         println!(
-            "{test} {:2}: {mean:5.1} mm, {:>10} {most:5.1} mm, iou {:.3}, limb {:4.1} mm, {:?} {:.0} ms",
+            "{test} {:2}: {mean:5.1} mm, {:>10} {most:5.1} mm, iou {:.3}, limb {:4.1} mm, {:?} {:.0} ms {:?}",
             tracked.frame,
             model.rig().joints()[joint].name,
             tracked.mean_iou(),
             1000.0 * tracked.misalignment.worst_m(),
             tracked.stage,
-            times[tracked.frame].1.as_secs_f64() * 1e3
+            times[tracked.frame].1.as_secs_f64() * 1e3,
+            tracked.misalignment.misaligned().collect::<Vec<_>>()
         );
         sum += mean / FRAMES as f64;
         worst = worst.max(most);
