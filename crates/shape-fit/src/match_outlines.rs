@@ -1,5 +1,6 @@
 //! Correspondences between the rim of the projected model and the contour of an image, both ways.
 
+use pulp::{Arch, Simd, WithSimd};
 use vision::RimPoint;
 
 use crate::observation::Outline;
@@ -16,6 +17,7 @@ pub struct Matches {
     pub of_outline: Vec<u32>,
     rim: [Vec<f32>; 4],
     least: Vec<f32>,
+    squared: Vec<f32>,
 }
 
 impl Matches {
@@ -32,23 +34,58 @@ impl Matches {
         self.of_rim.clear();
         self.of_rim.resize(count, NONE);
         self.of_outline.clear();
-        let [xs, ys, us, vs] = [0, 1, 2, 3].map(|i| &self.rim[i][..count]);
+        self.squared.resize(count, 0.0);
+        let rim = self.rim.each_ref().map(|numbers| &numbers[..count]);
+        let (least, of_rim) = (&mut self.least[..count], &mut self.of_rim[..count]);
         for (at, (pixel, normal)) in outline.pixels.iter().zip(&outline.normals).enumerate() {
-            let [x, y, u, v] = key(*pixel, *normal, normal_px);
-            let (mut nearest, mut nearest_squared) = (NONE, f32::INFINITY);
-            let (least, of_rim) = (&mut self.least[..count], &mut self.of_rim[..count]);
-            for i in 0..count {
-                let (dx, dy, du, dv) = (xs[i] - x, ys[i] - y, us[i] - u, vs[i] - v);
-                let squared = dx * dx + dy * dy + du * du + dv * dv;
-                let is_less = squared < least[i];
-                least[i] = if is_less { squared } else { least[i] };
-                of_rim[i] = if is_less { at as u32 } else { of_rim[i] };
-                let is_nearest = squared < nearest_squared;
-                nearest_squared = if is_nearest { squared } else { nearest_squared };
-                nearest = if is_nearest { i as u32 } else { nearest };
-            }
+            let point = key(*pixel, *normal, normal_px);
+            let squared = &mut self.squared[..count];
+            let nearest = Arch::new().dispatch(Nearest { at: at as u32, point, rim, squared, least, of_rim });
             self.of_outline.push(nearest);
         }
+    }
+}
+
+/// The search for the partner of one point of the outline; rim points that find it nearer than others before take it.
+struct Nearest<'a> {
+    at: u32,
+    point: [f32; 4],
+    rim: [&'a [f32]; 4],
+    squared: &'a mut [f32],
+    least: &'a mut [f32],
+    of_rim: &'a mut [u32],
+}
+
+/// Numbers compared at a time.
+const LANES: usize = 8;
+
+impl WithSimd for Nearest<'_> {
+    type Output = u32;
+
+    /// Index of the first of the nearest rim points.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> u32 {
+        let Self { at, point: [x, y, u, v], rim: [xs, ys, us, vs], squared, least, of_rim } = self;
+        let count = squared.len();
+        let (xs, ys, us, vs) = (&xs[..count], &ys[..count], &us[..count], &vs[..count]);
+        let (least, of_rim) = (&mut least[..count], &mut of_rim[..count]);
+        for i in 0..count {
+            let (dx, dy, du, dv) = (xs[i] - x, ys[i] - y, us[i] - u, vs[i] - v);
+            let distance = dx * dx + dy * dy + du * du + dv * dv;
+            squared[i] = distance;
+            let is_less = distance < least[i];
+            least[i] = if is_less { distance } else { least[i] };
+            of_rim[i] = if is_less { at } else { of_rim[i] };
+        }
+        let (chunks, rest) = squared.as_chunks::<LANES>();
+        let mut lanes = [f32::INFINITY; LANES];
+        for chunk in chunks {
+            for lane in 0..LANES {
+                lanes[lane] = if chunk[lane] < lanes[lane] { chunk[lane] } else { lanes[lane] };
+            }
+        }
+        let smallest = lanes.iter().chain(rest).copied().fold(f32::INFINITY, f32::min);
+        squared.iter().position(|&distance| distance == smallest).map_or(NONE, |i| i as u32)
     }
 }
 

@@ -35,7 +35,7 @@ const TWIST: f64 = 0.25;
 /// Steps are shortened so that no angle (radians) or coordinate (metres) changes by more.
 const LONGEST: f64 = 0.4;
 /// Relative gain of energy below which a step is over.
-const LEAST_GAIN: f64 = 2e-3;
+const LEAST_GAIN: f64 = 1e-2;
 
 /// Buffers of the optimisation, and the body that it poses.
 #[derive(Debug)]

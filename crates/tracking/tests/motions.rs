@@ -60,12 +60,12 @@ fn follow(test: &str, subjects: &[usize], views: usize, noise: Option<u64>, limi
 #[test]
 fn scanned_people_are_followed_through_squats_and_turns() {
     let test = "scanned_people_are_followed_through_squats_and_turns";
-    follow(test, &[17, 60], 8, None, [0.008, 0.05, 0.95]);
+    follow(test, &[17, 60], 8, None, [0.008, 0.12, 0.93]);
 }
 
 #[test]
 fn a_scanned_person_is_followed_in_four_noisy_views() {
-    follow("a_scanned_person_is_followed_in_four_noisy_views", &[33], 4, Some(3), [0.02, 0.15, 0.90]);
+    follow("a_scanned_person_is_followed_in_four_noisy_views", &[33], 4, Some(3), [0.01, 0.05, 0.93]);
 }
 
 #[test]
