@@ -1,6 +1,7 @@
 //! How often a disturbed pose is found again: local optimisation alone, and several particle searches before it.
 //!
-//! `cargo run --release -p tracking --example recovery [STARTS]` prints a table for bodies drawn by 8 cameras. A start is a body and a
+//! `cargo run --release -p tracking --example recovery [STARTS] [LIMBS]` prints a table for bodies drawn by 8 cameras; LIMBS is
+//! `arm`, `arms` or `leg`, all of them if it is left out. A start is a body and a
 //! pose of its own, a limb or two of which are turned by 10, 20 or 40 degrees in each angle, in random directions.
 
 #[path = "../tests/moving/mod.rs"]
@@ -51,7 +52,11 @@ fn main() {
     let model = BodyModel::shipped();
     let cameras = cameras(8);
     println!("{starts} starts each; found: all joints within {:.0} mm; 95 % intervals", 1000.0 * FOUND_M);
-    for (limbs, name) in [(&[0][..], "one arm"), (&[0, 1], "both arms"), (&[2], "a leg")] {
+    let wanted = std::env::args().nth(2);
+    for (limbs, name) in [(&[0][..], "arm"), (&[0, 1], "arms"), (&[2], "leg")] {
+        if wanted.as_ref().is_some_and(|wanted| wanted != name) {
+            continue;
+        }
         for degrees in [10.0f64, 20.0, 40.0] {
             let mut found = vec![0; methods().len()];
             let mut seconds = vec![0.0; methods().len()];
@@ -83,7 +88,7 @@ fn main() {
             for ((method, _), (&found, seconds)) in methods().iter().zip(found.iter().zip(&seconds)) {
                 let [low, high] = interval(found, starts);
                 println!(
-                    "{name:<10} {degrees:>2.0} deg  {method:<24} {:5.1} %  ({low:.0} to {high:.0})  {:.0} ms",
+                    "{name:<5} {degrees:>2.0} deg  {method:<24} {:5.1} %  ({low:.0} to {high:.0})  {:.0} ms",
                     100.0 * found as f64 / starts as f64,
                     1000.0 * seconds / starts as f64
                 );
