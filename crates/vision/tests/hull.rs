@@ -149,6 +149,16 @@ fn a_hull_of_very_many_cells_is_refused() {
 }
 
 #[test]
+fn a_calibration_in_millimetres_is_refused_at_once() {
+    let Some(mut capture) = frame_0("calibration in millimetres") else { return };
+    for camera in &mut capture.cameras {
+        camera.camera_from_world.translation.vector *= 1000.0;
+    }
+    let error = carve(&capture, &ALL, &HullOptions::default()).unwrap_err();
+    assert!(matches!(error, Error::TooManyCells { .. } | Error::EmptyHull { .. }), "{error}");
+}
+
+#[test]
 fn two_balls_are_two_pieces() {
     let ball = |centre: Vector3<f64>| {
         let mut mesh = Mesh::default();

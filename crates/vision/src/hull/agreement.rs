@@ -34,6 +34,8 @@ const DISAGREES: f64 = 0.02;
 
 /// Cells of the coarse carving, metres.
 const COARSE_M: f64 = 0.02;
+/// Coarse cells that half a side of the cube to be carved has at most: a calibration in another unit makes it huge.
+const MOST_CELLS_A_SIDE: f64 = 128.0;
 
 /// What coarse carving tells.
 pub(super) struct Coarse {
@@ -63,7 +65,8 @@ pub(super) fn carve_coarsely(cones: &[Cone], root: &Cube, options: &HullOptions)
         kept_by_others: vec![Vec::new(); cones.len()],
         bounds: None,
     };
-    carving.carve(*root, COARSE_M.max(options.cell_m) / 2.0);
+    let cell = COARSE_M.max(options.cell_m).max(root.half / MOST_CELLS_A_SIDE);
+    carving.carve(*root, cell / 2.0);
     let volume = |cubes: &[Cube]| cubes.iter().map(|cube| (2.0 * cube.half).powi(3)).sum::<f64>();
     let kept = volume(&carving.kept);
     let alone: Vec<_> = carving.kept_by_others.iter().map(|cubes| volume(cubes)).collect();
