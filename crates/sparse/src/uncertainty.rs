@@ -2,7 +2,7 @@
 /// are as uncertain as they are, and uncertainty grows over a gap (tuned on every third trial of five-actions).
 const RETAINED: f64 = 0.98;
 /// What the model leaves out: neighbours that are all alike, points that hang from a skeleton (tuned likewise).
-const SCALE: f64 = 0.68;
+const SCALE: f64 = 0.55;
 
 /// Variance of every coordinate, carried from frame to frame.
 ///
