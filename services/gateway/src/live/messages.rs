@@ -79,7 +79,8 @@ pub(super) struct Frame {
     frame: u64,
     #[serde(default)]
     time: f64,
-    points: Vec<Option<[f64; 3]>>,
+    /// a point that lacks a coordinate was not measured
+    points: Vec<Option<[Option<f64>; 3]>>,
     #[serde(default)]
     sigmas: Vec<Option<f64>>,
 }
@@ -89,9 +90,17 @@ impl From<Frame> for v1::LiveFrame {
         Self {
             frame: frame.frame,
             time: frame.time,
-            positions_m: frame.points.into_iter().flat_map(|p| p.unwrap_or([f64::NAN; 3])).collect(),
+            positions_m: frame.points.into_iter().flat_map(position).collect(),
             sigmas_m: frame.sigmas.into_iter().map(|s| s.unwrap_or(f64::NAN)).collect(),
         }
+    }
+}
+
+/// NaN unless all three coordinates were measured.
+fn position(point: Option<[Option<f64>; 3]>) -> [f64; 3] {
+    match point {
+        Some([Some(x), Some(y), Some(z)]) => [x, y, z],
+        _ => [f64::NAN; 3],
     }
 }
 
@@ -252,6 +261,15 @@ mod tests {
         let frame = v1::LiveFrame::from(frame);
         assert_eq!((frame.frame, &frame.positions_m[..3]), (7, &[1.0, 2.0, 3.0][..]));
         assert!(frame.positions_m[3..].iter().all(|v| v.is_nan()) && frame.sigmas_m[1].is_nan());
+    }
+
+    #[test]
+    fn a_point_that_lacks_a_coordinate_was_not_measured() {
+        let text = r#"{"type":"frame","frame":8,"points":[[1,null,3],[4,5,6]]}"#;
+        let Ok(FromClient::Frame(frame)) = read_text(text) else { panic!() };
+        let positions = v1::LiveFrame::from(frame).positions_m;
+        assert!(positions[..3].iter().all(|v| v.is_nan()));
+        assert_eq!(positions[3..], [4.0, 5.0, 6.0]);
     }
 
     #[test]
