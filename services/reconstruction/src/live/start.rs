@@ -6,7 +6,7 @@ use model::Skeleton;
 use motion_db::ControlTable;
 use proto::v1::{self, LiveDelivery};
 use service::compute;
-use sparse::{Parameters, Session, control_points};
+use sparse::{Method, Parameters, Session, control_points};
 use std::sync::Arc;
 
 /// Frames from one state to the next, unless the client says otherwise.
@@ -101,9 +101,36 @@ fn parameters(json: &str) -> Result<Parameters, CallError> {
     let parameters: Parameters =
         serde_json::from_str(json).map_err(|e| out_of_range("parameters_json", e, "parameters as JSON"))?;
     parameters.check()?;
+    let refuse = |name, found: &str, expected| {
+        Err(sparse::Error::Parameter { name, found: found.to_owned(), expected }.into())
+    };
+    if parameters.smooth {
+        return refuse("smooth", "true", "false: a live stream knows no frames to come");
+    }
+    if parameters.method == Method::Gplvm {
+        return refuse("method", "gplvm", "another one for a live stream: gplvm is for runs only");
+    }
     Ok(parameters)
 }
 
 fn out_of_range(field: &'static str, found: impl ToString, expected: &'static str) -> CallError {
     proto::Error::OutOfRange { field, found: found.to_string(), expected }.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_that_do_nothing_live_are_refused() {
+        for (json, expected) in [
+            (r#"{"smooth": true}"#, "smooth is true, expected false"),
+            (r#"{"method": "gplvm"}"#, "method is gplvm, expected another one"),
+        ] {
+            let error = parameters(json).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+        assert!(parameters(r#"{"smooth": false, "method": "lpca"}"#).is_ok());
+        assert!(parameters("").is_ok());
+    }
 }
