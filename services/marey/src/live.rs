@@ -145,7 +145,7 @@ async fn send(mut source: Source, mut sender: Sender, begin: Instant) -> anyhow:
         }
         let Some(points) = source.next().await? else { break };
         frame += 1;
-        let message = frame_message(frame, begin.elapsed().as_secs_f64(), &points);
+        let message = frame_message(frame, begin.elapsed().as_secs_f64(), points.samples());
         if sender.send(message).await.is_err() {
             // The server has ended the stream and says why on the other side.
             return Ok(frame);

@@ -228,7 +228,8 @@ async fn stream(
         clock.set_missed_tick_behavior(MissedTickBehavior::Burst);
         for (number, points) in (1..=count).zip(frames.iter().cycle()) {
             clock.tick().await;
-            sender.send(frame_message(number, begin.elapsed().as_secs_f64(), points)).await?;
+            let time = begin.elapsed().as_secs_f64();
+            sender.send(frame_message(number, time, points.as_slice().into())).await?;
         }
         sender.send(json!({ "type": "end" }).to_string()).await
     });

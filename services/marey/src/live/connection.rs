@@ -5,7 +5,7 @@ use futures::{
     SinkExt, StreamExt,
     stream::{SplitSink, SplitStream},
 };
-use nalgebra::Vector3;
+use model::Samples;
 use serde_json::{Value, json};
 use tokio::net::TcpStream;
 use tokio_tungstenite::{
@@ -92,10 +92,18 @@ impl Receiver {
     }
 }
 
-/// A frame's message. `time`: seconds, comes back with the pose; `points`: metres, NaN where not measured.
-pub fn frame_message(frame: u64, time: f64, points: &[Vector3<f64>]) -> String {
-    let points: Vec<_> = points.iter().map(|p| p.x.is_finite().then_some([p.x, p.y, p.z])).collect();
-    json!({ "type": "frame", "frame": frame, "time": time, "points": points }).to_string()
+/// A frame's message. `time`: seconds, comes back with the pose. A point with a coordinate that is not finite was not
+/// measured.
+pub fn frame_message(frame: u64, time: f64, samples: Samples<'_>) -> String {
+    let positions = samples.positions.iter();
+    let points: Vec<_> =
+        positions.map(|p| p.iter().all(|v| v.is_finite()).then_some([p.x, p.y, p.z])).collect();
+    let mut message = json!({ "type": "frame", "frame": frame, "time": time, "points": points });
+    if !samples.sigmas.is_empty() {
+        let sigmas = (0..samples.positions.len()).map(|point| samples.sigma(point));
+        message["sigmas"] = sigmas.collect::<Vec<_>>().into();
+    }
+    message.to_string()
 }
 
 /// What the server answered instead of opening a WebSocket.
@@ -105,5 +113,31 @@ fn refusal(error: tungstenite::Error) -> anyhow::Error {
     match problem.as_ref().and_then(|problem| problem["detail"].as_str()) {
         Some(detail) => anyhow!("{detail}"),
         None => anyhow!("the server answered {}", response.status()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_point_that_lacks_a_coordinate_is_null() {
+        let positions = [
+            Vector3::new(1.0, 2.0, 3.0),
+            Vector3::new(1.0, f64::NAN, 3.0),
+            Vector3::new(1.0, 2.0, f64::INFINITY),
+        ];
+        let message: Value = serde_json::from_str(&frame_message(7, 0.5, (&positions[..]).into())).unwrap();
+        assert_eq!(message["points"], json!([[1.0, 2.0, 3.0], null, null]));
+        assert!(message.get("sigmas").is_none());
+    }
+
+    #[test]
+    fn standard_deviations_go_with_their_points() {
+        let positions = [Vector3::zeros(); 2];
+        let samples = Samples { positions: &positions, sigmas: &[0.01, f64::NAN] };
+        let message: Value = serde_json::from_str(&frame_message(1, 0.0, samples)).unwrap();
+        assert_eq!(message["sigmas"], json!([0.01, null]));
     }
 }

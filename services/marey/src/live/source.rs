@@ -4,7 +4,7 @@ use std::{io::BufRead, path::Path};
 
 use anyhow::{Context, bail, ensure};
 use formats::PointsOptions;
-use model::PointTrajectories;
+use model::{PointTrajectories, Samples};
 use nalgebra::Vector3;
 use tokio::sync::mpsc;
 
@@ -12,6 +12,34 @@ use tokio::sync::mpsc;
 const FRAME_RATE: f64 = 60.0;
 /// Lines that are read before they can be sent.
 const LINES_AHEAD: usize = 4;
+
+/// What was measured of the chosen points in one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// metres, NaN where not measured
+    positions: Vec<Vector3<f64>>,
+    /// standard deviation of each coordinate, metres, NaN where unknown; empty where none is known
+    sigmas: Vec<f64>,
+}
+
+impl Measured {
+    /// All of it.
+    pub fn samples(&self) -> Samples<'_> {
+        Samples { positions: &self.positions, sigmas: &self.sigmas }
+    }
+}
+
+/// Where the numbers of a line are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Columns {
+    names: Vec<String>,
+    /// the column of each point's x; y and z follow
+    x: Vec<usize>,
+    /// the column of each point's standard deviation, if it has one
+    sigma: Vec<Option<usize>>,
+    /// number of columns
+    width: usize,
+}
 
 /// A file, or lines that come in.
 pub enum Source {
@@ -23,11 +51,11 @@ pub enum Source {
         next: usize,
         step: usize,
     },
-    /// lines of a .csv, a frame each; `columns` are those of each point's x
+    /// lines of a .csv, a frame each
     Lines {
-        names: Vec<String>,
-        columns: Vec<usize>,
-        width: usize,
+        columns: Columns,
+        /// lines read, the header among them
+        line_number: u64,
         lines: mpsc::Receiver<std::io::Result<String>>,
     },
 }
@@ -66,27 +94,15 @@ impl Source {
     }
 
     fn of_stdin(chosen: &[String]) -> anyhow::Result<Self> {
+        let mut line_number = 0;
         let mut header = String::new();
-        std::io::stdin().read_line(&mut header)?;
-        let titles: Vec<&str> = header.trim().split(',').map(str::trim).collect();
-        let points =
-            titles.iter().enumerate().filter_map(|(i, t)| Some((t.strip_suffix("_x")?.to_owned(), i)));
-        let points: Vec<(String, usize)> = points.collect();
-        let names: Vec<String> =
-            if chosen.is_empty() { points.iter().map(|(n, _)| n.clone()).collect() } else { chosen.to_vec() };
-        let column = |name: &String| {
-            let found = points.iter().find(|(n, _)| n == name).map(|(_, at)| *at);
-            let at = found.with_context(|| format!("the first line has no {name}_x"))?;
-            let follows =
-                |i: usize, axis: &str| titles.get(at + i).is_some_and(|t| *t == format!("{name}_{axis}"));
-            ensure!(
-                follows(1, "y") && follows(2, "z"),
-                "the first line has {name}_x without {name}_y,{name}_z after it"
-            );
-            Ok(at)
-        };
-        let columns = names.iter().map(column).collect::<anyhow::Result<_>>()?;
-        let width = titles.len();
+        while is_skipped(&header) {
+            header.clear();
+            line_number += 1;
+            let read = std::io::stdin().read_line(&mut header).context("standard input")?;
+            ensure!(read > 0, "standard input has no line, expected a header: time,left_wrist_x,…");
+        }
+        let columns = Columns::of_header(&header, chosen)?;
         let (line_read, lines) = mpsc::channel(LINES_AHEAD);
         // Reading may block for ever: the thread ends with the program.
         std::thread::spawn(move || {
@@ -96,13 +112,14 @@ impl Source {
                 }
             }
         });
-        Ok(Self::Lines { names, columns, width, lines })
+        Ok(Self::Lines { columns, line_number, lines })
     }
 
     /// Names of the points.
     pub fn names(&self) -> &[String] {
         match self {
-            Self::File { names, .. } | Self::Lines { names, .. } => names,
+            Self::File { names, .. } => names,
+            Self::Lines { columns, .. } => &columns.names,
         }
     }
 
@@ -111,28 +128,135 @@ impl Source {
         matches!(self, Self::File { .. })
     }
 
-    /// Positions of the next frame's points, metres, NaN where not measured; `None` at the end.
-    pub async fn next(&mut self) -> anyhow::Result<Option<Vec<Vector3<f64>>>> {
+    /// The next frame; `None` at the end. Nothing is lost when the waiting for it is given up.
+    pub async fn next(&mut self) -> anyhow::Result<Option<Measured>> {
         match self {
             Self::File { columns, trajectories, next, step, .. } => {
                 if *next >= trajectories.num_frames() {
                     return Ok(None);
                 }
-                let frame = trajectories.frame(*next);
+                let samples = trajectories.samples(*next);
                 *next += *step;
-                Ok(Some(columns.iter().map(|c| frame[*c]).collect()))
+                let positions = columns.iter().map(|c| samples.positions[*c]).collect();
+                let sigma = |c: &usize| samples.sigma(*c).unwrap_or(f64::NAN);
+                let sigmas =
+                    if samples.sigmas.is_empty() { Vec::new() } else { columns.iter().map(sigma).collect() };
+                Ok(Some(Measured { positions, sigmas }))
             }
-            Self::Lines { columns, width, lines, .. } => {
-                let Some(line) = lines.recv().await.transpose()? else { return Ok(None) };
-                let cells: Vec<&str> = line.trim().split(',').map(str::trim).collect();
-                ensure!(cells.len() == *width, "a line has {} cells, the first one has {width}", cells.len());
-                let number = |at: usize| match cells[at] {
-                    "" => Ok(f64::NAN),
-                    text => text.parse::<f64>().with_context(|| format!("{text:?} is no number")),
-                };
-                let point = |at: &usize| Ok(Vector3::new(number(*at)?, number(at + 1)?, number(at + 2)?));
-                Ok(Some(columns.iter().map(point).collect::<anyhow::Result<_>>()?))
+            Self::Lines { columns, line_number, lines } => {
+                while let Some(line) = lines.recv().await {
+                    let line = line.context("standard input")?;
+                    *line_number += 1;
+                    if !is_skipped(&line) {
+                        let at = || format!("line {line_number} of standard input");
+                        return columns.read(&line).with_context(at).map(Some);
+                    }
+                }
+                Ok(None)
             }
         }
+    }
+}
+
+/// Whether a line is blank or a comment.
+fn is_skipped(line: &str) -> bool {
+    let line = line.trim();
+    line.is_empty() || line.starts_with('#')
+}
+
+impl Columns {
+    /// Of the first line; `chosen`: the points to use, all if empty.
+    fn of_header(header: &str, chosen: &[String]) -> anyhow::Result<Self> {
+        let titles: Vec<&str> = header.trim().split(',').map(str::trim).collect();
+        let with_x = titles.iter().filter_map(|title| title.strip_suffix("_x"));
+        let names: Vec<String> =
+            if chosen.is_empty() { with_x.map(str::to_owned).collect() } else { chosen.to_vec() };
+        let column = |title: String| titles.iter().position(|t| *t == title);
+        let x = |name: &String| {
+            let at = column(format!("{name}_x"));
+            let at = at.with_context(|| format!("the first line has no {name}_x"))?;
+            let follows =
+                |i: usize, axis: &str| titles.get(at + i).is_some_and(|t| *t == format!("{name}_{axis}"));
+            ensure!(
+                follows(1, "y") && follows(2, "z"),
+                "the first line has {name}_x without {name}_y,{name}_z after it"
+            );
+            Ok(at)
+        };
+        let x = names.iter().map(x).collect::<anyhow::Result<_>>()?;
+        let sigma = names.iter().map(|name| column(format!("{name}_sigma"))).collect();
+        Ok(Self { x, sigma, width: titles.len(), names })
+    }
+
+    /// One frame. An empty cell or a number that is not finite was not measured.
+    fn read(&self, line: &str) -> anyhow::Result<Measured> {
+        let cells: Vec<&str> = line.trim().split(',').map(str::trim).collect();
+        let width = self.width;
+        ensure!(cells.len() == width, "{} cells, expected {width} as in the first line", cells.len());
+        let number = |at: usize| match cells[at] {
+            "" => Ok(f64::NAN),
+            text => text.parse::<f64>().with_context(|| format!("{text:?} is no number")),
+        };
+        let point = |at: &usize| Ok(Vector3::new(number(*at)?, number(at + 1)?, number(at + 2)?));
+        let positions = self.x.iter().map(point).collect::<anyhow::Result<_>>()?;
+        if self.sigma.iter().all(Option::is_none) {
+            return Ok(Measured { positions, sigmas: Vec::new() });
+        }
+        let sigma = |at: &Option<usize>| {
+            let found = at.map_or(Ok(f64::NAN), number)?;
+            let is_sensible = found.is_nan() || found > 0.0 && found.is_finite();
+            ensure!(is_sensible, "a standard deviation is {found}, expected one above 0 m or an empty cell");
+            Ok(found)
+        };
+        let sigmas = self.sigma.iter().map(sigma).collect::<anyhow::Result<_>>()?;
+        Ok(Measured { positions, sigmas })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "time,head_x,head_y,head_z,head_sigma,root_x,root_y,root_z";
+
+    #[test]
+    fn a_line_has_positions_and_standard_deviations() {
+        let columns = Columns::of_header(HEADER, &[]).unwrap();
+        assert_eq!(columns.names, ["head", "root"]);
+        let measured = columns.read("0,1,2,3,0.01,4,,6").unwrap();
+        assert_eq!(measured.positions[0], Vector3::new(1.0, 2.0, 3.0));
+        assert!(measured.positions[1].y.is_nan());
+        assert_eq!((measured.sigmas[0], measured.sigmas[1].is_nan()), (0.01, true));
+        let columns = Columns::of_header(HEADER, &["root".to_owned()]).unwrap();
+        assert!(columns.read("0,1,2,3,0.01,4,5,6").unwrap().sigmas.is_empty());
+    }
+
+    #[test]
+    fn a_line_that_makes_no_sense_is_refused() {
+        let columns = Columns::of_header(HEADER, &[]).unwrap();
+        for (line, expected) in [
+            ("0,1,2,3,0.01,4,5", "7 cells"),
+            ("0,1,2,x,0.01,4,5,6", "\"x\" is no number"),
+            ("0,1,2,3,0,4,5,6", "a standard deviation is 0"),
+        ] {
+            let error = columns.read(line).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+        assert!(Columns::of_header("time,head_x,head_z,head_y", &[]).is_err());
+    }
+
+    #[tokio::test]
+    async fn comments_are_skipped_and_errors_say_the_line() {
+        let columns = Columns::of_header(HEADER, &[]).unwrap();
+        let (line_read, lines) = mpsc::channel(4);
+        for line in ["# metres", "", "0,1,2,3,0.01,4,5,6", "0,1"] {
+            line_read.try_send(Ok(line.to_owned())).unwrap();
+        }
+        drop(line_read);
+        let mut source = Source::Lines { columns, line_number: 1, lines };
+        assert!(source.next().await.unwrap().is_some());
+        let error = source.next().await.unwrap_err().to_string();
+        assert_eq!(error, "line 5 of standard input");
+        assert!(source.next().await.unwrap().is_none());
     }
 }
