@@ -140,7 +140,7 @@ impl MarkerMap {
 const UPRIGHT: f64 = 0.3;
 
 /// A warning if the head, or else the root, is not above the ankles: then most likely another axis is up.
-fn upside_down(trajectories: &PointTrajectories) -> Option<String> {
+pub fn upside_down(trajectories: &PointTrajectories) -> Option<String> {
     let column = |name: &str| trajectories.point_index(name);
     let (top, name) = column("head").map(|c| (c, "head")).or_else(|| column("root").map(|c| (c, "root")))?;
     let ankles: Vec<usize> = ["left_ankle", "right_ankle"].into_iter().filter_map(column).collect();

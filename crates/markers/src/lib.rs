@@ -22,7 +22,7 @@ mod parse;
 mod presets;
 mod template;
 
-pub use apply::{Mapped, MappedPoint};
+pub use apply::{Mapped, MappedPoint, upside_down};
 pub use detect::{Fit, PointFit, detect, fits};
 pub use error::Error;
 pub use map::{Group, MarkerMap, Point};

@@ -45,6 +45,9 @@ impl SkeletonSize {
     }
 }
 
+/// Nobody is recorded farther from the origin, metres; nor are angles larger, radians.
+const FARTHEST: f64 = 1e4;
+
 impl MotionDatabase {
     /// Builds a database: every clip at 60 frames a second, in smooth coordinates about the mean rotation of
     /// each joint, translations scaled to one leg length, and learns the performers' zero poses. Clips shorter than 8
@@ -93,7 +96,10 @@ impl MotionDatabase {
         let first_pose = self.num_poses();
         self.check_size(first_pose + num_poses)?;
         let scale = self.leg_length / SkeletonSize::leg_length(clip.motion.skeleton());
-        for pose in coordinates.chunks_exact(dofs) {
+        for (frame, pose) in coordinates.chunks_exact(dofs).enumerate() {
+            if let Some(dof) = pose.iter().position(|v| !(v.abs() <= FARTHEST)) {
+                return Err(Error::Value { clip: clip.name.clone(), frame, dof, found: pose[dof] });
+            }
             let scaled = pose.iter().enumerate().map(|(d, v)| (if d < 3 { v * scale } else { *v }) as f32);
             self.coordinates.to_mut().extend(scaled);
         }

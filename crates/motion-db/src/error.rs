@@ -99,4 +99,18 @@ pub enum Error {
         /// longest
         max: usize,
     },
+    /// A coordinate of a recording that nobody can have.
+    #[error(
+        "clip {clip}: coordinate {dof} of frame {frame} (60 a second) is {found}, expected at most 10000 metres or radians"
+    )]
+    Value {
+        /// name of the clip
+        clip: String,
+        /// frame after resampling, from 0
+        frame: usize,
+        /// smooth coordinate, from 0
+        dof: usize,
+        /// its value
+        found: f64,
+    },
 }

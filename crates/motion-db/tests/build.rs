@@ -187,3 +187,17 @@ fn every_pose_knows_its_clip() {
         assert_eq!(database.clip_of(clip.first_pose + clip.num_poses - 1), i);
     }
 }
+
+#[test]
+fn a_recording_that_nobody_can_have_made_is_refused_by_name() {
+    let mut clips = vec![drawn(Action::Walk, 0, 1, 60), drawn(Action::Walk, 1, 1, 60)];
+    for farthest in [1e25, 1e300] {
+        let walk = clips[1].motion.clone();
+        let mut values: Vec<f64> = (0..walk.num_frames()).flat_map(|f| walk.pose(f).to_vec()).collect();
+        values[30 * 62 + 1] = farthest;
+        clips[1].name = "broken".into();
+        clips[1].motion = Motion::new(walk.skeleton().clone(), walk.frame_rate(), values).unwrap();
+        let error = MotionDatabase::build(&clips).unwrap_err();
+        assert!(matches!(&error, Error::Value { clip, .. } if clip == "broken"), "{error}");
+    }
+}

@@ -2,7 +2,7 @@ use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
 use kinematics::{Kinematics, PointSet};
-use motion_db::{ControlTable, MotionDatabase, WindowIndex, start_poses};
+use motion_db::{ControlTable, MotionDatabase, StartPose, WindowIndex, start_poses};
 use nalgebra::Vector3;
 use regression::gplvm::Gplvm;
 use serde::{Deserialize, Serialize};
@@ -22,9 +22,19 @@ const FINALISTS: usize = 3;
 /// Frames around a frame whose measured points join its search, if the future is known: 0.1 s and 0.2 s away.
 const AROUND: [i32; 4] = [-12, -6, 6, 12];
 
+/// Where a track begins.
+pub(crate) struct Begun {
+    pub track: Track,
+    /// first frame that it is to be stepped through: before it nothing to start from was measured
+    pub frame: usize,
+    /// the database's pose in that frame, if it is one's
+    pose: Option<StartPose>,
+}
+
 /// A start pose on trial.
 struct Probe {
     start: Track,
+    pose: Option<StartPose>,
     now: Track,
     /// minus the log of the probability it gave to what was measured since
     surprise: f64,
@@ -252,17 +262,21 @@ impl<'a> Reconstructor<'a> {
         };
         let mut sigmas = vec![0.0; dofs];
         let mut uncertainty = Uncertainty::new(&self.zero_pose_variance);
-        let mut track = self.start(&mut tracker, frames.start, None)?;
+        let begun = self.start(&mut tracker, frames.start, None)?;
+        if begun.frame > frames.start {
+            self.play_back(&mut tracker, &begun, &frames, &mut reconstruction);
+        }
+        let mut track = begun.track;
         let mut before = track.clone();
         let mut lost = 0;
-        for frame in frames.clone() {
+        for frame in begun.frame..frames.end {
             before.copy_from(&track);
             let mut step = tracker.step(&mut track, self.observed(frame));
             lost = if step.energy() > self.parameters.lost_energy { lost + 1 } else { 0 };
             if lost >= self.parameters.lost_frames {
                 lost = 0;
                 uncertainty.restart();
-                track = self.start(&mut tracker, frame, Some(before.clone()))?;
+                track = self.start(&mut tracker, frame, Some(before.clone()))?.track;
                 step = tracker.step(&mut track, self.observed(frame));
             }
             reconstruction.coordinates.extend_from_slice(track.newest());
@@ -281,15 +295,60 @@ impl<'a> Reconstructor<'a> {
         Ok(reconstruction)
     }
 
+    /// Adds the frames before a start, in which nothing to start from was measured: the database's clip that the start was
+    /// taken from, played backwards from there; less and less sure.
+    fn play_back(
+        &self,
+        tracker: &mut Tracker<'_>,
+        begun: &Begun,
+        frames: &Range<usize>,
+        reconstruction: &mut Reconstruction,
+    ) {
+        let mut track = begun.track.clone();
+        let step = tracker.step(&mut track, self.observed(begun.frame));
+        let mut uncertainty = Uncertainty::new(&self.zero_pose_variance);
+        let mut sigmas = vec![0.0; self.database.num_dofs()];
+        tracker.standard_deviations(&mut uncertainty, &mut sigmas);
+        track.copy_from(&begun.track);
+        let mut found = Vec::new();
+        for frame in (frames.start..begun.frame).rev() {
+            if let Some(start) = begun.pose {
+                let clip = &self.database.clips()[self.database.clip_of(start.pose)];
+                // The track of a start ends in the pose before it.
+                let pose = (start.pose + 1 + frame).saturating_sub(begun.frame);
+                tracker.place(
+                    &StartPose { pose: pose.max(clip.first_pose + self.parameters.window), ..start },
+                    &mut track,
+                );
+            }
+            let quality = FrameQuality {
+                residual_m: 0.0,
+                sigma_rad: tracker.unmeasured_deviations(&mut uncertainty, &mut sigmas),
+                energy: 0.0,
+                neighbour_distance_deg: step.neighbour_distance,
+                measured_points: 0,
+            };
+            if frame < frames.end {
+                found.push((track.newest().to_vec(), sigmas.clone(), quality));
+            }
+        }
+        for (pose, sigmas, quality) in found.into_iter().rev() {
+            reconstruction.coordinates.extend(pose);
+            reconstruction.sigmas.extend(sigmas);
+            reconstruction.quality.push(quality);
+        }
+    }
+
     /// The best of several beginnings at `frame` (method §2, mend 8): database poses whose control points fit the
     /// coming frames, each run over these frames, and `current` among them if there is one. The one that makes the
-    /// measurements most probable wins.
+    /// measurements most probable wins. If fewer than two points are measured at `frame`, it begins at the first frame in which
+    /// two are.
     pub(crate) fn start(
         &self,
         tracker: &mut Tracker<'_>,
         frame: usize,
         current: Option<Track>,
-    ) -> Result<Track> {
+    ) -> Result<Begun> {
         tracker.begin(Stage::Start);
         let trajectories = &self.session.trajectories;
         // Without two measured points there is nothing to fit: look at the first frame that has them.
@@ -313,9 +372,11 @@ impl<'a> Reconstructor<'a> {
             &self.exclude_poses,
             self.parameters.start_candidates,
         );
-        let begun = starts.iter().map(|s| tracker.track_from(s)).chain(current);
-        let mut probes: Vec<Probe> =
-            begun.map(|start| Probe { now: start.clone(), start, surprise: 0.0 }).collect();
+        let of_database = starts.iter().map(|s| (tracker.track_from(s), Some(*s)));
+        let mut probes: Vec<Probe> = of_database
+            .chain(current.map(|track| (track, None)))
+            .map(|(start, pose)| Probe { now: start.clone(), start, pose, surprise: 0.0 })
+            .collect();
         // All run a third of the way, the best few to the end.
         for (part, keep) in [(first..first + ahead / 3, FINALISTS), (first + ahead / 3..first + ahead, 1)] {
             for probe in &mut probes {
@@ -326,7 +387,9 @@ impl<'a> Reconstructor<'a> {
             probes.sort_by(|a, b| a.surprise.total_cmp(&b.surprise));
             probes.truncate(keep);
         }
-        probes.into_iter().next().map(|probe| probe.start).ok_or(Error::NoStart { frame })
+        let best = probes.into_iter().next().ok_or(Error::NoStart { frame })?;
+        // Where nothing comes any more, it goes on from here without measurements.
+        Ok(Begun { track: best.start, frame: after.unwrap_or(frame), pose: best.pose })
     }
 }
 

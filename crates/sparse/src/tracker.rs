@@ -275,6 +275,18 @@ impl<'a> Tracker<'a> {
         angles.iter().sum::<f64>() / angles.len().max(1) as f64
     }
 
+    /// The same of a frame beside the last one in which nothing was measured: what was uncertain there, and the prior's
+    /// variance again.
+    pub fn unmeasured_deviations(&self, before: &mut Uncertainty, all: &mut [f64]) -> f64 {
+        let dofs = all.len();
+        for (d, sigma) in all.iter_mut().enumerate() {
+            *sigma = self.prior.covariance[d * dofs + d].sqrt();
+        }
+        before.update(|d| self.prior.covariance[d * dofs + d], all);
+        let angles = &all[kinematics::ROOT_DOFS..];
+        angles.iter().sum::<f64>() / angles.len().max(1) as f64
+    }
+
     /// Adds what the last frame says of the performer's zero pose, beside what is assumed of it, counted `share` times.
     pub fn add_zero_pose_information(&mut self, share: f64, information: &mut Information) {
         let dofs = self.prior.mean.len();

@@ -48,7 +48,9 @@ impl Uncertainty {
             let own = prior(d).max(1e-300);
             let left = (*sigma * *sigma / own).min(1.0);
             let before = if self.is_new { own / (1.0 - RETAINED * RETAINED) } else { self.variances[d] };
-            self.variances[d] = left * (RETAINED * RETAINED * before + own);
+            // Where a person stands and which way they face is known from the frame before only: nothing of it is forgotten.
+            let retained = if matches!(d, 0 | 2 | kinematics::HEADING) { 1.0 } else { RETAINED * RETAINED };
+            self.variances[d] = left * (retained * before + own);
             *sigma = (SCALE * SCALE * self.variances[d] + self.constant[d]).sqrt();
         }
         self.is_new = false;

@@ -43,16 +43,18 @@ impl Reconstructor<'_> {
             return Ok(());
         }
         let Some(prior) = FreePrior::new(&prior) else { return Ok(()) };
-        let frames = zero_pose_frames.min(self.session.num_frames());
+        let frames = zero_pose_frames;
         let dofs = self.database.num_dofs();
         for _ in 0..ROUNDS {
             let mut information =
                 Information { precision: DMatrix::zeros(dofs, dofs), vector: DVector::zeros(dofs) };
             let mut tracker = Tracker::new(self)?;
-            let mut track = self.start(&mut tracker, 0, None)?;
-            for frame in 0..frames {
+            let begun = self.start(&mut tracker, 0, None)?;
+            let mut track = begun.track;
+            let end = (begun.frame + frames).min(self.session.num_frames());
+            for frame in begun.frame..end {
                 tracker.step(&mut track, self.observed(frame));
-                if frame % STRIDE == 0 {
+                if (frame - begun.frame).is_multiple_of(STRIDE) {
                     tracker.add_zero_pose_information(STRIDE as f64 / CORRELATED_FRAMES, &mut information);
                 }
             }

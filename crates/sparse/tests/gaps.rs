@@ -75,8 +75,23 @@ fn a_gap_at_either_end_is_survived() {
     let truth = trial(0);
     let whole = session(&truth, &SIX);
     let begin = changed(&whole, |f, _, v| if f < 20 { NOT_MEASURED } else { v });
-    let (_, after) = survives(&recorded, &truth, &begin, 0..20, "nothing at first");
-    assert!(after < 1.5, "{after} cm");
+    let (within, after) = survives(&recorded, &truth, &begin, 0..20, "nothing at first");
+    assert!(within < 15.0 && after < 1.5, "{within} cm, then {after} cm");
+    let late = changed(&whole, |f, _, v| if f < 60 { NOT_MEASURED } else { v });
+    let (within, after) = survives(&recorded, &truth, &late, 0..60, "nothing for a second");
+    assert!(within < 50.0 && after < 1.5, "{within} cm, then {after} cm");
+    // A chunk that ends before anything is measured has the same poses.
+    let parameters = Parameters::default();
+    let reconstructor = recorded.reconstructor(&late, &parameters);
+    let (chunk, all) =
+        (reconstructor.reconstruct(0..40, &mut on), reconstructor.reconstruct(0..200, &mut on));
+    let (chunk, all) = (chunk.unwrap(), all.unwrap());
+    assert_eq!(chunk.coordinates, all.coordinates[..chunk.coordinates.len()]);
+    let first = all.sigmas.len() / 200;
+    assert!(
+        all.sigmas[0] > 3.0 * all.sigmas[60 * first],
+        "where the person was is less sure, a second before"
+    );
     let end = changed(&whole, |f, _, v| if f >= 170 { NOT_MEASURED } else { v });
     let found = recorded.reconstruct(&end, &Parameters::default());
     assert!(found.coordinates.iter().all(|v| v.is_finite()));

@@ -13,6 +13,9 @@ use service::{compute, config::MemoryConfig, motion_database, motion_database::I
 use std::sync::Arc;
 use store::Store;
 
+/// Progress when all files were looked into: imports and build, most of the work, are not counted before that.
+const PLANNED: f64 = 0.1;
+
 /// Most motion files of a part.
 const PART_FILES: usize = 32;
 /// A part that has so many bytes gets no further file.
@@ -48,7 +51,7 @@ impl Handler for PlanHandler {
         let mut outcome = Outcome::default();
         let mut imports = Vec::new();
         if !divided.parts.is_empty() {
-            job.progress(0.8, "choosing coordinates");
+            job.progress(PLANNED, "choosing coordinates");
             let basis = match &request.base {
                 Some(base) => self.base(base).await?,
                 None => self.sampled(&job, &divided, request.bvh_metres_per_unit).await?,
@@ -113,7 +116,7 @@ impl PlanHandler {
         let mut num_entries = 0;
         for (done, file) in request.files.iter().enumerate() {
             job.check()?;
-            job.progress(0.8 * done as f64 / request.files.len() as f64, format!("reading {}", file.name));
+            job.progress(PLANNED * done as f64 / request.files.len() as f64, format!("reading {}", file.name));
             let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
             let bytes = objects::read(&self.store, input, self.memory.max_object_bytes).await?;
             let (name, most) = (file.name.clone(), left.min(self.memory.max_build_bytes));

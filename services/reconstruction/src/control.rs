@@ -70,9 +70,9 @@ pub(crate) fn choose(
     let in_file = |source| InputError::Markers { file: file.to_owned(), source };
     let names = trajectories.names();
     let (map, must_have) = match markers {
-        Markers::AsNamed => return as_named(trajectories, wanted, skeleton),
+        Markers::AsNamed => return as_named(file, trajectories, wanted, skeleton, warnings),
         Markers::Auto if has_control_points(names, skeleton) => {
-            return as_named(trajectories, wanted, skeleton);
+            return as_named(file, trajectories, wanted, skeleton, warnings);
         }
         Markers::Auto => (detected(file, names, warnings).map_err(in_file)?, false),
         Markers::Pairs(pairs) => (map_of(pairs, names, wanted, file)?, true),
@@ -105,10 +105,13 @@ pub(crate) fn choose(
 }
 
 fn as_named(
+    file: &str,
     trajectories: PointTrajectories,
     wanted: &[String],
     skeleton: &Skeleton,
+    warnings: &mut Vec<String>,
 ) -> Result<Chosen, InputError> {
+    warnings.extend(markers::upside_down(&trajectories).map(|warning| format!("{file}: {warning}")));
     let names = if wanted.is_empty() { trajectories.names() } else { wanted };
     Ok(Chosen { points: control_points(skeleton, names)?, trajectories })
 }

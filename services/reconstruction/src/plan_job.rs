@@ -69,7 +69,8 @@ impl Handler for PlanHandler {
         })
         .await?;
         job.check()?;
-        job.progress(0.9, "planning");
+        // Its chunks, which are nearly all of the work, are not counted before it is done.
+        job.progress(0.02, "planning");
         let artefact = objects::write(store, &job, "session.bin", "application/octet-stream", bytes).await?;
         let session = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
         let report = JobReport {

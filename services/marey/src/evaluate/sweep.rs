@@ -32,7 +32,7 @@ pub struct SweepArgs {
     /// Hide a point, or all of them, for a while in the middle of each trial: one:0.5s, all:0.5s
     #[arg(long, value_delimiter = ',', value_name = "WHAT:HOW_LONG")]
     occlusion: Vec<Occlusion>,
-    /// Also smooth over the whole trial, with the future as well as the past; the same as --compare smooth=true
+    /// Also with what is measured up to 0.2 s later, as an offline run may; the same as --compare smooth=true
     #[arg(long)]
     offline: bool,
     /// Any other parameter of the reconstruction: NAME=VALUE; may be given often
