@@ -26,7 +26,7 @@ pub(crate) struct RunReport<'a> {
     quality: Summary,
     /// Feet, where they were looked for and found.
     feet: Option<&'a FootReport>,
-    warnings: &'a [String],
+    warnings: Vec<String>,
     timings: Timings<'a>,
 }
 
@@ -110,7 +110,8 @@ impl<'a> RunReport<'a> {
             fitted_skeleton: job.fitted.as_ref(),
             quality: summary(&finished.merged.quality),
             feet: finished.feet.as_ref().map(|feet| &feet.report),
-            warnings: &job.warnings,
+            warnings: [&job.warnings[..], &doubts(&finished.merged.quality, request.parameters.lost_energy)]
+                .concat(),
             timings: Timings {
                 plan: &job.plan,
                 chunks,
@@ -121,6 +122,31 @@ impl<'a> RunReport<'a> {
     }
 }
 
+/// Frames that fit badly or were not measured, from a twentieth of all on.
+const MANY: usize = 20;
+
+/// What a user should know of the result. `lost_energy`: energy from which on a frame fits badly.
+fn doubts(quality: &[FrameQuality], lost_energy: f64) -> Vec<String> {
+    let share = |count: usize| 100.0 * count as f64 / quality.len().max(1) as f64;
+    let bad = quality.iter().filter(|q| q.energy > lost_energy).count();
+    let unmeasured = quality.iter().filter(|q| q.measured_points == 0).count();
+    let mut doubts = Vec::new();
+    if bad * MANY > quality.len() {
+        doubts.push(format!(
+            "{:.0} % of the frames fit the measured points badly (energy above {lost_energy}): is another axis up, is a point \
+             named wrongly, is the motion unlike all in the database? see quality.csv",
+            share(bad)
+        ));
+    }
+    if unmeasured * MANY > quality.len() {
+        doubts.push(format!(
+            "in {:.0} % of the frames no point was measured: they are guessed",
+            share(unmeasured)
+        ));
+    }
+    doubts
+}
+
 fn summary(quality: &[FrameQuality]) -> Summary {
     let count = quality.len().max(1) as f64;
     Summary {
@@ -128,5 +154,24 @@ fn summary(quality: &[FrameQuality]) -> Summary {
         max_residual_m: quality.iter().map(|q| q.residual_m).fold(0.0, f64::max),
         mean_sigma_rad: quality.iter().map(|q| q.sigma_rad).sum::<f64>() / count,
         frames_without_measurement: quality.iter().filter(|q| q.measured_points == 0).count(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(energy: f64, measured_points: usize) -> FrameQuality {
+        FrameQuality { residual_m: 0.0, sigma_rad: 0.1, energy, neighbour_distance_deg: 3.0, measured_points }
+    }
+
+    #[test]
+    fn a_run_that_fits_badly_or_guesses_much_says_so() {
+        let good = vec![frame(1.0, 4); 100];
+        assert!(doubts(&good, 20.0).is_empty());
+        let bad = [vec![frame(90.0, 4); 30], vec![frame(1.0, 0); 20], good[..50].to_vec()].concat();
+        let said = doubts(&bad, 20.0);
+        assert!(said[0].starts_with("30 % of the frames fit"), "{said:?}");
+        assert!(said[1].starts_with("in 20 % of the frames no point"), "{said:?}");
     }
 }
