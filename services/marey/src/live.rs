@@ -6,23 +6,32 @@ mod source;
 use std::{
     fs,
     io::{BufWriter, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, ensure};
 use base64::{Engine, prelude::BASE64_STANDARD};
 use serde_json::{Value, json};
-use tokio::time::MissedTickBehavior;
+use tokio::time::{Interval, MissedTickBehavior, timeout_at};
+use tokio_util::sync::CancellationToken;
 
-use crate::{cli::ServerArgs, serve::runtime};
-pub use connection::{Connection, Sender, frame_message};
+pub use self::connection::{Connection, frame_message};
+use self::connection::{Lost, Sender};
+use crate::{cli::ServerArgs, connection::Server, serve::runtime};
 use source::Source;
+
+/// After a connection was lost: from the first attempt to the next one, doubled up to the longest wait.
+const FIRST_WAIT: Duration = Duration::from_millis(200);
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
+/// How long a lost connection is tried again.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Follow a performer live
 ///
 /// Streams measured points to a server at 60 frames a second, as a motion capture system would, and writes the poses that
-/// come back. A file (.csv, .trc, .c3d) is played in real time; with '-', lines of such a .csv are sent as they come in.
+/// come back. A file (.csv, .trc, .c3d) is played in real time; with '-', lines of such a .csv are sent as they come in. A
+/// connection that is lost is opened again, for up to a minute, and goes on from the last state.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey live points.csv --database walks --skeleton performer.asf -o poses.csv
@@ -40,7 +49,8 @@ pub struct Args {
     /// Control points to use, separated by commas [default: all in the file]
     #[arg(long = "use", value_delimiter = ',', value_name = "POINTS")]
     chosen: Vec<String>,
-    /// Where the poses go, as CSV: frame, then a column for each degree of freedom, metres and radians [default: the terminal]
+    /// Where the poses go, as CSV: frame, then a column for each degree of freedom, metres and radians; a file
+    /// is written anew [default: the terminal]
     #[arg(long, short)]
     output: Option<PathBuf>,
     /// Compute every frame, however late, instead of dropping what can't be computed in time
@@ -61,10 +71,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let source = Source::open(&args.points, &args.chosen)?;
     let start = start(args, source.names())?;
     let server = args.server.server()?;
-    runtime()?.block_on(async {
-        let connection = Connection::open(&server, &args.database, &start).await?;
-        follow(args, source, connection).await
-    })
+    runtime()?.block_on(follow(args, &server, source, start))
 }
 
 fn start(args: &Args, points: &[String]) -> anyhow::Result<Value> {
@@ -78,6 +85,7 @@ fn start(args: &Args, points: &[String]) -> anyhow::Result<Value> {
     start["parameters"] = values(&args.parameters)?;
     if let Some(path) = args.state_file.as_ref().filter(|path| path.exists()) {
         let state = fs::read(path).with_context(|| path.display().to_string())?;
+        ensure!(!state.is_empty(), "{} is empty, expected a live state", path.display());
         start["state"] = BASE64_STANDARD.encode(state).into();
     }
     Ok(start)
@@ -88,71 +96,206 @@ pub fn values(options: &[String]) -> anyhow::Result<Value> {
     crate::run::pairs(options, |v| serde_json::from_str(v).unwrap_or_else(|_| v.into()))
 }
 
-async fn follow(args: &Args, source: Source, connection: Connection) -> anyhow::Result<()> {
-    let Connection { sender, mut receiver, started } = connection;
-    let mut output: Box<dyn Write> = match &args.output {
-        Some(path) => Box::new(fs::File::create(path).with_context(|| path.display().to_string())?),
-        None => Box::new(std::io::stdout()),
-    };
-    let mut output = BufWriter::new(&mut output);
-    let dofs = started["dofs"].as_array().into_iter().flatten().filter_map(Value::as_str);
-    writeln!(output, "frame,{}", dofs.collect::<Vec<_>>().join(","))?;
+/// Follows the performer to the end of the frames, over as many connections as it takes.
+async fn follow(args: &Args, server: &Server, source: Source, mut start: Value) -> anyhow::Result<()> {
+    let opened = Connection::open(server, &args.database, &start).await;
+    let mut connection = opened.map_err(|error| with_state_file(args, error))?;
+    // The state is of this version, whatever gets the name meanwhile.
+    let database = connection.started["motion_database"].as_str().unwrap_or(&args.database).to_owned();
     let begin = Instant::now();
-    let sending = tokio::spawn(send(source, sender, begin));
-    let mut latencies = Vec::new();
-    let mut dropped = 0;
-    let end = loop {
-        let Some(message) = receiver.next().await? else { break Ok(()) };
-        match message["type"].as_str() {
-            Some("pose") => {
-                let sent = message["time"].as_f64().unwrap_or_default();
-                latencies.push(begin.elapsed().as_secs_f64() - sent);
-                dropped = message["dropped"].as_u64().unwrap_or(dropped);
-                let numbers = message["pose"].as_array().into_iter().flatten();
-                let row: String = numbers.map(|v| format!(",{v}")).collect();
-                writeln!(output, "{}{row}", message["frame"])?;
-                output.flush()?;
+    let mut answers = Answers::new(args, &connection.started, begin)?;
+    let mut feed = Feed::new(source, begin);
+    loop {
+        let Connection { sender, mut receiver, .. } = connection;
+        let over = CancellationToken::new();
+        let mut sending = tokio::spawn(send(feed, sender, over.clone()));
+        let mut sent = None;
+        let end = loop {
+            tokio::select! {
+                answer = receiver.next() => match answer {
+                    Ok(Some(message)) => answers.take(&message)?,
+                    Ok(None) => break receiver.end(),
+                    Err(error) => break Err(error),
+                },
+                // An error of the input ends everything.
+                result = &mut sending, if sent.is_none() => sent = Some(result??),
             }
-            Some("state") => keep_state(args, &message)?,
-            Some("error") => break Err(message["message"].as_str().unwrap_or("an error").to_owned()),
-            _ => {}
+        };
+        over.cancel();
+        feed = match sent {
+            Some(feed) => feed,
+            None => sending.await??,
+        };
+        match end {
+            Ok(()) => break,
+            Err(error) if error.is::<Lost>() => {
+                eprintln!("marey: {error:#}; connecting again for up to {} s", PATIENCE.as_secs());
+            }
+            Err(error) => return Err(error.context("the server ended the stream")),
         }
-    };
-    output.flush()?;
-    if let Err(message) = end {
-        bail!("the server ended the stream: {message}");
+        answers.forget_unanswered(feed.frame);
+        if let Some(state) = &answers.state {
+            start["state"] = state.as_str().into();
+        }
+        connection = reopen(server, &database, &start).await?;
+        feed.clock.reset();
+        let from = if start["state"].is_null() { "anew" } else { "from the last state" };
+        eprintln!("marey: connected again; going on {from} with frame {}", feed.frame + 1);
     }
-    let frames = sending.await??;
-    eprintln!("{}", Latency::of(latencies, frames, dropped));
+    eprintln!("{}", Latency::of(answers.latencies, feed.frame, answers.dropped));
     Ok(())
 }
 
-fn keep_state(args: &Args, message: &Value) -> anyhow::Result<()> {
-    let Some(path) = &args.state_file else { return Ok(()) };
-    let state = message["state"].as_str().unwrap_or_default();
-    let state = BASE64_STANDARD.decode(state).context("the server's state is not base64")?;
-    fs::write(path, state).with_context(|| path.display().to_string())
-}
-
-/// Sends frames: a file's at 60 a second, those of standard input as they come. How many it were.
-async fn send(mut source: Source, mut sender: Sender, begin: Instant) -> anyhow::Result<u64> {
-    let mut clock = tokio::time::interval(Duration::from_secs_f64(1.0 / 60.0));
-    clock.set_missed_tick_behavior(MissedTickBehavior::Burst);
-    let mut frame = 0;
+/// Opens a connection in place of one that was lost.
+async fn reopen(server: &Server, database: &str, start: &Value) -> anyhow::Result<Connection> {
+    let deadline = Instant::now() + PATIENCE;
+    let mut wait = FIRST_WAIT;
     loop {
-        if source.is_file() {
-            clock.tick().await;
-        }
-        let Some(points) = source.next().await? else { break };
-        frame += 1;
-        let message = frame_message(frame, begin.elapsed().as_secs_f64(), points.samples());
-        if sender.send(message).await.is_err() {
-            // The server has ended the stream and says why on the other side.
-            return Ok(frame);
+        tokio::time::sleep(wait).await;
+        let why = match timeout_at(deadline.into(), Connection::open(server, database, start)).await {
+            Ok(Ok(connection)) => return Ok(connection),
+            Ok(Err(error)) if error.is::<Lost>() => error,
+            Ok(Err(error)) => return Err(error),
+            Err(_) => anyhow!("{} does not answer", server.url),
+        };
+        wait = (wait * 2).min(LONGEST_WAIT);
+        if Instant::now() + wait >= deadline {
+            let seconds = PATIENCE.as_secs();
+            return Err(why.context(format!("the connection was lost and did not come back in {seconds} s")));
         }
     }
-    sender.send(json!({ "type": "end" }).to_string()).await?;
-    Ok(frame)
+}
+
+/// Says which file it is, if the state in it is what the server refuses.
+fn with_state_file(args: &Args, error: anyhow::Error) -> anyhow::Error {
+    match &args.state_file {
+        Some(path) if format!("{error:#}").contains("live state") => {
+            error.context(path.display().to_string())
+        }
+        _ => error,
+    }
+}
+
+/// What has come back.
+struct Answers<'a> {
+    state_file: Option<&'a Path>,
+    output: BufWriter<Box<dyn Write>>,
+    begin: Instant,
+    /// the last state, base64
+    state: Option<String>,
+    /// of each pose, seconds
+    latencies: Vec<f64>,
+    /// frames without a pose
+    dropped: u64,
+    /// those of them that were sent on earlier connections
+    dropped_before: u64,
+}
+
+impl<'a> Answers<'a> {
+    fn new(args: &'a Args, started: &Value, begin: Instant) -> anyhow::Result<Self> {
+        let output: Box<dyn Write> = match &args.output {
+            Some(path) => Box::new(fs::File::create(path).with_context(|| path.display().to_string())?),
+            None => Box::new(std::io::stdout()),
+        };
+        let mut output = BufWriter::new(output);
+        let dofs = started["dofs"].as_array().into_iter().flatten().filter_map(Value::as_str);
+        writeln!(output, "frame,{}", dofs.collect::<Vec<_>>().join(","))?;
+        output.flush()?;
+        Ok(Self {
+            state_file: args.state_file.as_deref(),
+            output,
+            begin,
+            state: None,
+            latencies: Vec::new(),
+            dropped: 0,
+            dropped_before: 0,
+        })
+    }
+
+    /// Writes a pose, keeps a state.
+    fn take(&mut self, message: &Value) -> anyhow::Result<()> {
+        match message["type"].as_str() {
+            Some("pose") => {
+                let sent = message["time"].as_f64().unwrap_or_default();
+                self.latencies.push(self.begin.elapsed().as_secs_f64() - sent);
+                if let Some(dropped) = message["dropped"].as_u64() {
+                    self.dropped = self.dropped_before + dropped;
+                }
+                let numbers = message["pose"].as_array().into_iter().flatten();
+                let row: String = numbers.map(|v| format!(",{v}")).collect();
+                writeln!(self.output, "{}{row}", message["frame"])?;
+                self.output.flush()?;
+            }
+            Some("state") => {
+                let text = message["state"].as_str().unwrap_or_default();
+                if let Some(path) = self.state_file {
+                    let state = BASE64_STANDARD.decode(text).context("the server's state is not base64")?;
+                    replace_file(path, &state)?;
+                }
+                self.state = Some(text.to_owned());
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The connection is gone: of `sent` frames, those without a pose get none.
+    fn forget_unanswered(&mut self, sent: u64) {
+        self.dropped_before = sent.saturating_sub(self.latencies.len() as u64);
+        self.dropped = self.dropped_before;
+    }
+}
+
+/// Writes a file beside it first, so that there always is a whole one.
+fn replace_file(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    fs::write(&part, content).with_context(|| Path::new(&part).display().to_string())?;
+    fs::rename(&part, path).with_context(|| path.display().to_string())
+}
+
+/// What is sent: a file's frames at 60 a second, those of standard input as they come.
+struct Feed {
+    source: Source,
+    clock: Interval,
+    /// number of the last frame sent
+    frame: u64,
+    begin: Instant,
+}
+
+impl Feed {
+    fn new(source: Source, begin: Instant) -> Self {
+        let mut clock = tokio::time::interval(Duration::from_secs_f64(1.0 / 60.0));
+        clock.set_missed_tick_behavior(MissedTickBehavior::Burst);
+        Self { source, clock, frame: 0, begin }
+    }
+
+    /// Sends frames until there are no more, or nobody takes them: the other side says why.
+    async fn send(&mut self, sender: &mut Sender) -> anyhow::Result<()> {
+        loop {
+            if self.source.is_file() {
+                self.clock.tick().await;
+            }
+            let Some(measured) = self.source.next().await? else { break };
+            self.frame += 1;
+            let time = self.begin.elapsed().as_secs_f64();
+            if sender.send(frame_message(self.frame, time, measured.samples())).await.is_err() {
+                return Ok(());
+            }
+        }
+        // As above.
+        let _ = sender.send(json!({ "type": "end" }).to_string()).await;
+        Ok(())
+    }
+}
+
+/// Sends frames until the stream is `over`; what is left is for the next one.
+async fn send(mut feed: Feed, mut sender: Sender, over: CancellationToken) -> anyhow::Result<Feed> {
+    tokio::select! {
+        () = over.cancelled() => {}
+        sent = feed.send(&mut sender) => sent?,
+    }
+    Ok(feed)
 }
 
 /// How long poses took, from sending the frame to having the pose.
@@ -208,5 +351,18 @@ mod tests {
             assert!((latency.quantile_ms(share) - expected).abs() < 1e-9);
         }
         assert!(Latency::of(vec![], 0, 0).quantile_ms(0.5).is_nan());
+    }
+
+    #[test]
+    fn a_state_file_is_replaced_as_a_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("performer.state");
+        for content in [&b"first"[..], b"2nd"] {
+            replace_file(&path, content).unwrap();
+            assert_eq!(fs::read(&path).unwrap(), content);
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        let missing = replace_file(&folder.path().join("none/performer.state"), b"").unwrap_err();
+        assert!(format!("{missing:#}").contains("performer.state"));
     }
 }
