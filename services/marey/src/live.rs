@@ -343,6 +343,11 @@ impl std::fmt::Display for Latency {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use futures::{SinkExt, StreamExt};
+    use tokio_tungstenite::tungstenite::{
+        Message,
+        protocol::{CloseFrame, frame::coding::CloseCode},
+    };
 
     #[test]
     fn quantiles_are_those_of_the_nearest_rank() {
@@ -364,5 +369,28 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         let missing = replace_file(&folder.path().join("none/performer.state"), b"").unwrap_err();
         assert!(format!("{missing:#}").contains("performer.state"));
+    }
+
+    #[tokio::test]
+    async fn a_lost_connection_is_opened_again() {
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let url = format!("http://{}", listener.local_addr().unwrap());
+        let serving = tokio::spawn(async move {
+            // First it hangs up, then it has no room.
+            drop(listener.accept().await.unwrap());
+            let mut full = tokio_tungstenite::accept_async(listener.accept().await.unwrap().0).await.unwrap();
+            full.next().await.unwrap().unwrap();
+            full.close(Some(CloseFrame { code: CloseCode::Again, reason: "full".into() })).await.unwrap();
+            let mut socket =
+                tokio_tungstenite::accept_async(listener.accept().await.unwrap().0).await.unwrap();
+            let start = socket.next().await.unwrap().unwrap().into_text().unwrap().as_str().to_owned();
+            socket.send(Message::text(r#"{"type": "started"}"#)).await.unwrap();
+            start
+        });
+        let server = Server { url, api_key: "mk_test".to_owned(), database_url: None };
+        let start = json!({ "type": "start", "state": "TUFSRVlMVjE" });
+        let connection = reopen(&server, "walks@2", &start).await.unwrap();
+        assert_eq!(connection.started["type"], "started");
+        assert_eq!(serving.await.unwrap(), start.to_string());
     }
 }
