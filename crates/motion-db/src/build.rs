@@ -97,7 +97,7 @@ impl MotionDatabase {
         self.check_size(first_pose + num_poses)?;
         let scale = self.leg_length / SkeletonSize::leg_length(clip.motion.skeleton());
         for (frame, pose) in coordinates.chunks_exact(dofs).enumerate() {
-            if let Some(dof) = pose.iter().position(|v| !(v.abs() <= FARTHEST)) {
+            if let Some(dof) = pose.iter().position(|v| v.is_nan() || v.abs() > FARTHEST) {
                 return Err(Error::Value { clip: clip.name.clone(), frame, dof, found: pose[dof] });
             }
             let scaled = pose.iter().enumerate().map(|(d, v)| (if d < 3 { v * scale } else { *v }) as f32);

@@ -255,7 +255,7 @@ mod tests {
             for x in 0..width {
                 let is_person = match (y + seed) % 4 {
                     0 => true,
-                    1 => (x / (3 + seed)) % 2 == 0,
+                    1 => (x / (3 + seed)).is_multiple_of(2),
                     2 => x % 64 == 63 || x % 64 == 0,
                     _ => false,
                 };

@@ -271,7 +271,7 @@ fn sample(args: &SampleArgs) -> anyhow::Result<()> {
     let sex = args.sex.as_deref().map(|sex| if sex == "male" { Sex::Male } else { Sex::Female });
     let wanted = Wanted { stature_m: args.stature, mass_kg: args.mass, age_years: args.age, sex };
     let alpha = if args.alpha.is_empty() { model.alpha_for(&wanted)? } else { args.alpha.clone() };
-    if alpha.len() > model.num_components() || alpha.iter().any(|a| !(a.abs() <= 6.0)) {
+    if alpha.len() > model.num_components() || alpha.iter().any(|a| a.is_nan() || a.abs() > 6.0) {
         bail!(
             "--alpha has {} numbers, expected at most {} within -6 to 6",
             alpha.len(),

@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::{
-    bench, body, cmu, connection::Server, database, demo, evaluate, health, keys, live, marker_sets, results, run,
-    sample, serve, status, up, upload,
+    bench, body, cmu, connection::Server, database, demo, evaluate, health, keys, live, marker_sets, results,
+    run, sample, serve, status, up, upload,
 };
 
 /// Full-body motion from a few control points.

@@ -114,7 +114,9 @@ fn request(args: &Args) -> anyhow::Result<Value> {
         ("cameras", (!args.cameras.is_empty()).then(|| json!(args.cameras))),
         (
             "camera_files",
-            (!args.camera_files.is_empty()).then(|| pairs(&args.camera_files, |name| name.into())).transpose()?,
+            (!args.camera_files.is_empty())
+                .then(|| pairs(&args.camera_files, |name| name.into()))
+                .transpose()?,
         ),
         ("background", args.background.as_ref().map(|kind| json!(kind))),
         ("metres_per_unit", args.calibration_unit.map(Value::from)),

@@ -116,7 +116,10 @@ impl PlanHandler {
         let mut num_entries = 0;
         for (done, file) in request.files.iter().enumerate() {
             job.check()?;
-            job.progress(PLANNED * done as f64 / request.files.len() as f64, format!("reading {}", file.name));
+            job.progress(
+                PLANNED * done as f64 / request.files.len() as f64,
+                format!("reading {}", file.name),
+            );
             let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
             let bytes = objects::read(&self.store, input, self.memory.max_object_bytes).await?;
             let (name, most) = (file.name.clone(), left.min(self.memory.max_build_bytes));

@@ -31,7 +31,7 @@ pub(crate) fn sample(model: &BodyModel, request: &v1::SampleBodyRequest) -> Resu
         let found = format!("{} numbers", request.alpha.len());
         return Err(out_of_range("alpha", &found, "at most as many as the model has components").into());
     }
-    if let Some(found) = request.alpha.iter().find(|a| !(a.abs() <= MOST)) {
+    if let Some(found) = request.alpha.iter().find(|a| a.is_nan() || a.abs() > MOST) {
         return Err(out_of_range("alpha", &found.to_string(), "-6 to 6 standard deviations").into());
     }
     Ok(model.shape(&request.alpha))
