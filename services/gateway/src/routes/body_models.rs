@@ -19,7 +19,7 @@ use uuid::Uuid;
 
 use super::{
     download::{self, Object},
-    lookup::{Latest, Lock},
+    lookup::{self, Latest, Lock},
     runs::{self, Run},
     start::{inputs, start},
 };
@@ -162,33 +162,10 @@ pub(super) async fn find(
     if which == SHIPPED || which == "shipped@1" {
         return Ok(shipped_row());
     }
-    let id: Option<Uuid> = match (Uuid::try_parse(which), which.rsplit_once('@')) {
-        (Ok(id), _) if id.is_nil() => return Ok(shipped_row()),
-        (Ok(id), _) => Some(id),
-        (Err(_), Some((name, version))) => {
-            let version: i32 = version.parse().map_err(|_| Error::not_found("body model", which))?;
-            sqlx::query_scalar(
-                "SELECT id FROM body_models WHERE project_id = $1 AND name = $2 AND version = $3",
-            )
-            .bind(project_id)
-            .bind(name)
-            .bind(version)
-            .fetch_optional(&mut *db)
-            .await?
-        }
-        (Err(_), None) => {
-            sqlx::query_scalar(
-                "SELECT id FROM body_models
-                 WHERE project_id = $1 AND name = $2
-                 ORDER BY (store_key IS NOT NULL AND $3) DESC, version DESC LIMIT 1",
-            )
-            .bind(project_id)
-            .bind(which)
-            .bind(latest == Latest::Ready)
-            .fetch_optional(&mut *db)
-            .await?
-        }
-    };
+    if Uuid::try_parse(which).is_ok_and(|id| id.is_nil()) {
+        return Ok(shipped_row());
+    }
+    let id: Option<Uuid> = lookup::version_id!(db, "body_models", "body model", project_id, which, latest);
     let query = match lock {
         Lock::None => select_body_models!("WHERE m.id = $1 AND m.project_id = $2"),
         Lock::Share => select_body_models!("WHERE m.id = $1 AND m.project_id = $2 FOR SHARE OF m"),

@@ -125,14 +125,8 @@ pub(super) async fn put_in_session(
     drop(db);
     let file_id = Uuid::now_v7();
     let key = store::key::file(caller.project_id, session_id, file_id);
-    uninterrupted(async move {
-        let stored = upload::receive(&app, &key, &announced, body).await?;
-        let new =
-            NewFile { id: file_id, owner: Owner::Session(session_id), name: &name, role, stored: &stored };
-        let kept = keep(&app, caller.project_id, &new).await;
-        settle(&app, &key, kept).await
-    })
-    .await
+    let upload = Upload { file_id, owner: Owner::Session(session_id), name, role, key };
+    receive(app, caller.project_id, upload, announced, body).await
 }
 
 /// Download a file of a session
@@ -232,14 +226,9 @@ pub(super) async fn put_in_database(
     check_collects(&database)?;
     let file_id = Uuid::now_v7();
     let key = store::key::motion_database_input(database.id, file_id);
-    uninterrupted(async move {
-        let stored = upload::receive(&app, &key, &announced, body).await?;
-        let owner = Owner::MotionDatabase(database.id);
-        let new = NewFile { id: file_id, owner, name: &name, role: FileRole::Motion, stored: &stored };
-        let kept = keep(&app, caller.project_id, &new).await;
-        settle(&app, &key, kept).await
-    })
-    .await
+    let upload =
+        Upload { file_id, owner: Owner::MotionDatabase(database.id), name, role: FileRole::Motion, key };
+    receive(app, caller.project_id, upload, announced, body).await
 }
 
 /// Delete a file of a motion database
@@ -314,14 +303,8 @@ pub(super) async fn put_in_body_model(
     check_collects_scans(&model)?;
     let file_id = Uuid::now_v7();
     let key = store::key::body_model_input(model.id, file_id);
-    uninterrupted(async move {
-        let stored = upload::receive(&app, &key, &announced, body).await?;
-        let owner = Owner::BodyModel(model.id);
-        let new = NewFile { id: file_id, owner, name: &name, role: FileRole::Scans, stored: &stored };
-        let kept = keep(&app, caller.project_id, &new).await;
-        settle(&app, &key, kept).await
-    })
-    .await
+    let upload = Upload { file_id, owner: Owner::BodyModel(model.id), name, role: FileRole::Scans, key };
+    receive(app, caller.project_id, upload, announced, body).await
 }
 
 /// Delete a file of a body model
@@ -342,6 +325,33 @@ pub(super) async fn delete_of_body_model(
     drop(db);
     let owner = Owner::BodyModel(model.id);
     uninterrupted(async move { remove(&app, caller.project_id, &owner, &name).await }).await
+}
+
+/// A file that is to come in.
+struct Upload {
+    file_id: Uuid,
+    owner: Owner,
+    name: String,
+    role: FileRole,
+    key: Key,
+}
+
+/// Receives a file to its end, whether or not the caller waits for it, and records it.
+async fn receive(
+    app: App,
+    project_id: Uuid,
+    upload: Upload,
+    announced: Announced,
+    body: Body,
+) -> Result<(StatusCode, Json<File>)> {
+    uninterrupted(async move {
+        let Upload { file_id, owner, name, role, key } = upload;
+        let stored = upload::receive(&app, &key, &announced, body).await?;
+        let new = NewFile { id: file_id, owner, name: &name, role, stored: &stored };
+        let kept = keep(&app, project_id, &new).await;
+        settle(&app, &key, kept).await
+    })
+    .await
 }
 
 enum Owner {

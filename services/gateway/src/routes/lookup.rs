@@ -153,6 +153,43 @@ impl MotionDatabase {
     }
 }
 
+/// The id of what `which` names in a table of versioned things: an id, `name@version`, or a name, which stands for its latest
+/// version. A macro, because SQL is written out where it is checked.
+macro_rules! version_id {
+    ($db:expr, $table:literal, $what:literal, $project_id:expr, $which:expr, $latest:expr) => {
+        match (uuid::Uuid::try_parse($which), $which.rsplit_once('@')) {
+            (Ok(id), _) => Some(id),
+            (Err(_), Some((name, version))) => {
+                let version: i32 = version.parse().map_err(|_| Error::not_found($what, $which))?;
+                sqlx::query_scalar(concat!(
+                    "SELECT id FROM ",
+                    $table,
+                    " WHERE project_id = $1 AND name = $2 AND version = $3"
+                ))
+                .bind($project_id)
+                .bind(name)
+                .bind(version)
+                .fetch_optional(&mut *$db)
+                .await?
+            }
+            (Err(_), None) => {
+                sqlx::query_scalar(concat!(
+                    "SELECT id FROM ",
+                    $table,
+                    " WHERE project_id = $1 AND name = $2
+                      ORDER BY (store_key IS NOT NULL AND $3) DESC, version DESC LIMIT 1"
+                ))
+                .bind($project_id)
+                .bind($which)
+                .bind($latest == Latest::Ready)
+                .fetch_optional(&mut *$db)
+                .await?
+            }
+        }
+    };
+}
+pub(super) use version_id;
+
 /// The columns of [`MotionDatabase`].
 macro_rules! select_motion_databases {
     ($rest:literal) => {
@@ -189,34 +226,7 @@ pub(super) async fn motion_database(
     latest: Latest,
     lock: Lock,
 ) -> Result<MotionDatabase> {
-    let id: Option<Uuid> = match (Uuid::try_parse(which), which.rsplit_once('@')) {
-        (Ok(id), _) => Some(id),
-        (Err(_), Some((name, version))) => {
-            let Ok(version) = version.parse::<i32>() else {
-                return Err(Error::not_found("motion database", which));
-            };
-            sqlx::query_scalar(
-                "SELECT id FROM motion_databases WHERE project_id = $1 AND name = $2 AND version = $3",
-            )
-            .bind(project_id)
-            .bind(name)
-            .bind(version)
-            .fetch_optional(&mut *db)
-            .await?
-        }
-        (Err(_), None) => {
-            sqlx::query_scalar(
-                "SELECT id FROM motion_databases
-                 WHERE project_id = $1 AND name = $2
-                 ORDER BY (store_key IS NOT NULL AND $3) DESC, version DESC LIMIT 1",
-            )
-            .bind(project_id)
-            .bind(which)
-            .bind(latest == Latest::Ready)
-            .fetch_optional(&mut *db)
-            .await?
-        }
-    };
+    let id: Option<Uuid> = version_id!(db, "motion_databases", "motion database", project_id, which, latest);
     let query = match lock {
         Lock::None => select_motion_databases!("WHERE d.id = $1 AND d.project_id = $2"),
         Lock::Share => select_motion_databases!("WHERE d.id = $1 AND d.project_id = $2 FOR SHARE OF d"),
