@@ -1,4 +1,5 @@
-//! The vocabulary of Marey: skeletons, poses, motions, point trajectories; cameras, silhouettes and meshes.
+//! The vocabulary of Marey: skeletons, poses, motions, point trajectories; cameras, pictures, silhouettes,
+//! matches of points and meshes.
 //!
 //! Units inside the program: metres, seconds, radians; y is up; coordinates are right-handed. Files in
 //! other units are converted when they are read and written (crate `formats`).
@@ -18,6 +19,7 @@ mod image;
 mod joint;
 mod mesh;
 mod motion;
+mod point_match;
 mod points;
 mod record;
 mod silhouette;
@@ -29,6 +31,7 @@ pub use image::Image;
 pub use joint::{Axis, Channel, ChannelKind, Joint};
 pub use mesh::Mesh;
 pub use motion::Motion;
+pub use point_match::PointMatch;
 pub use points::{PointTrajectories, Samples};
 pub use record::SkeletonRecord;
 pub use silhouette::Silhouette;

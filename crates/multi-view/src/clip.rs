@@ -5,30 +5,21 @@
 //!     top height   for every row: runs, then for every run: pixels skipped, pixels of the person      (all LEB128)
 //! ```
 
-use std::{
-    io::{Read as _, Write as _},
-    ops::Range,
-};
+use std::ops::Range;
 
-use flate2::{Compression, read::DeflateDecoder, write::DeflateEncoder};
 use model::Silhouette;
 
-use crate::{Error, Result};
+use crate::{
+    Error, Result,
+    packed::{Packed, Packer, put, take},
+};
 
 const MAGIC: &[u8] = b"MVSIL\x01";
-/// Longest clip once it is inflated, bytes: ten seconds take about one million.
-const MAX_BYTES: u64 = 256 << 20;
-/// Largest side of a picture, pixels.
-const MAX_SIDE: u64 = 1 << 15;
 
 /// Packs silhouettes one after the other.
 #[derive(Debug, Clone)]
 pub struct ClipWriter {
-    width: usize,
-    height: usize,
-    first_frame: usize,
-    num_frames: usize,
-    frames: Vec<u8>,
+    packer: Packer,
     row: Vec<u8>,
     frame: Vec<u8>,
 }
@@ -36,8 +27,7 @@ pub struct ClipWriter {
 impl ClipWriter {
     /// A clip of pictures of `width` × `height` pixels that begins with frame `first_frame` of its camera.
     pub fn new(width: usize, height: usize, first_frame: usize) -> Self {
-        let [frames, row, frame] = [Vec::new(), Vec::new(), Vec::new()];
-        Self { width, height, first_frame, num_frames: 0, frames, row, frame }
+        Self { packer: Packer::new(width, height, first_frame), row: Vec::new(), frame: Vec::new() }
     }
 
     /// Adds the next frame.
@@ -45,13 +35,12 @@ impl ClipWriter {
     /// # Errors
     /// [`Error::Clip`] if it is of another size.
     pub fn push(&mut self, silhouette: &Silhouette) -> Result<()> {
-        if (silhouette.width(), silhouette.height()) != (self.width, self.height) {
+        let Packer { width, height, .. } = self.packer;
+        if (silhouette.width(), silhouette.height()) != (width, height) {
             return Err(Error::Clip(format!(
-                "frame of {} x {} pixels, expected {} x {}",
+                "frame of {} x {} pixels, expected {width} x {height}",
                 silhouette.width(),
                 silhouette.height(),
-                self.width,
-                self.height
             )));
         }
         self.frame.clear();
@@ -61,7 +50,7 @@ impl ClipWriter {
         for y in top..bottom {
             self.row.clear();
             let (mut runs, mut end) = (0, 0);
-            while let Some((start, next)) = next_run(silhouette.row(y), end, self.width) {
+            while let Some((start, next)) = next_run(silhouette.row(y), end, width) {
                 put(&mut self.row, start - end);
                 put(&mut self.row, next - start);
                 runs += 1;
@@ -70,40 +59,24 @@ impl ClipWriter {
             put(&mut self.frame, runs);
             self.frame.extend_from_slice(&self.row);
         }
-        put(&mut self.frames, self.frame.len());
-        self.frames.extend_from_slice(&self.frame);
-        self.num_frames += 1;
+        self.packer.push(&self.frame);
         Ok(())
     }
 
     /// Frames so far.
     pub fn num_frames(&self) -> usize {
-        self.num_frames
+        self.packer.num_frames()
     }
 
     /// The file.
     pub fn finish(self) -> Vec<u8> {
-        let mut head = Vec::new();
-        for number in [self.width, self.height, self.first_frame, self.num_frames] {
-            put(&mut head, number);
-        }
-        let mut encoder = DeflateEncoder::new(MAGIC.to_vec(), Compression::default());
-        // writing to memory can't fail
-        let written = encoder.write_all(&head).and_then(|()| encoder.write_all(&self.frames));
-        written.and_then(|()| encoder.finish()).unwrap_or_default()
+        self.packer.finish(MAGIC)
     }
 }
 
 /// Silhouettes of consecutive frames of one camera.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SilhouetteClip {
-    width: usize,
-    height: usize,
-    first_frame: usize,
-    packed: Vec<u8>,
-    /// where each frame is in `packed`
-    places: Vec<Range<usize>>,
-}
+pub struct SilhouetteClip(Packed);
 
 impl SilhouetteClip {
     /// Reads what [`ClipWriter::finish`] gave.
@@ -111,44 +84,17 @@ impl SilhouetteClip {
     /// # Errors
     /// [`Error::Clip`] if the bytes are anything else.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
-        let damaged = |what: &str| Error::Clip(what.to_owned());
-        let deflated = bytes.strip_prefix(MAGIC).ok_or_else(|| damaged("other first bytes"))?;
-        let mut packed = Vec::new();
-        let read = DeflateDecoder::new(deflated).take(MAX_BYTES).read_to_end(&mut packed);
-        read.map_err(|e| Error::Clip(e.to_string()))?;
-        let mut at = 0;
-        let mut next = |limit: u64| {
-            let number = take(&packed, &mut at).filter(|&number| number <= limit);
-            number
-                .map(|number| (number as usize, at))
-                .ok_or_else(|| damaged("it ends early, or a number is too large"))
-        };
-        let (width, _) = next(MAX_SIDE)?;
-        let (height, _) = next(MAX_SIDE)?;
-        let (first_frame, _) = next(1 << 40)?;
-        let (num_frames, mut begin) = next(MAX_BYTES)?;
-        let mut places = Vec::new();
-        for _ in 0..num_frames {
-            let mut here = begin;
-            let length = take(&packed, &mut here).ok_or_else(|| damaged("it ends early"))?;
-            let end = (here as u64).saturating_add(length);
-            if end > packed.len() as u64 {
-                return Err(damaged("it ends early"));
-            }
-            places.push(here..end as usize);
-            begin = end as usize;
-        }
-        Ok(Self { width, height, first_frame, packed, places })
+        Packed::from_bytes(MAGIC, bytes).map(Self).map_err(Error::Clip)
     }
 
     /// The frames of its camera that are in it.
     pub fn frames(&self) -> Range<usize> {
-        self.first_frame..self.first_frame + self.places.len()
+        self.0.frames()
     }
 
     /// Width and height of the frames, pixels.
     pub fn size(&self) -> [usize; 2] {
-        [self.width, self.height]
+        [self.0.width, self.0.height]
     }
 
     /// The silhouette of a frame, counted as its camera does.
@@ -156,11 +102,9 @@ impl SilhouetteClip {
     /// # Errors
     /// [`Error::Frame`] if it isn't in the clip, [`Error::Clip`] if it is damaged.
     pub fn get(&self, frame: usize) -> Result<Silhouette> {
-        let range = self.frames();
-        let place = frame.checked_sub(range.start).and_then(|index| self.places.get(index));
-        let place = place.ok_or(Error::Frame { found: frame, start: range.start, end: range.end })?;
-        let mut silhouette = Silhouette::empty(self.width, self.height);
-        unpack(&self.packed[place.clone()], &mut silhouette)
+        let runs = self.0.get(frame)?;
+        let mut silhouette = Silhouette::empty(self.0.width, self.0.height);
+        unpack(runs, &mut silhouette)
             .ok_or_else(|| Error::Clip(format!("frame {frame} has runs outside the picture")))?;
         Ok(silhouette)
     }
@@ -218,30 +162,6 @@ fn fill(words: &mut [u64], start: usize, end: usize) {
         words[at / 64] |= ones << (at % 64);
         at = last;
     }
-}
-
-/// Appends a number, seven bits a byte, low bits first.
-fn put(to: &mut Vec<u8>, number: usize) {
-    let mut left = number;
-    while left >= 0x80 {
-        to.push((left & 0x7f) as u8 | 0x80);
-        left >>= 7;
-    }
-    to.push(left as u8);
-}
-
-/// Reads what [`put`] wrote; `None` at the end or beyond 63 bits.
-fn take(from: &[u8], at: &mut usize) -> Option<u64> {
-    let mut number = 0u64;
-    for shift in (0..63).step_by(7) {
-        let byte = *from.get(*at)?;
-        *at += 1;
-        number |= u64::from(byte & 0x7f) << shift;
-        if byte < 0x80 {
-            return Some(number);
-        }
-    }
-    None
 }
 
 #[cfg(test)]

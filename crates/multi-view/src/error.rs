@@ -49,6 +49,9 @@ pub enum Error {
     /// A clip of silhouettes that is damaged or cut off.
     #[error("not a clip of silhouettes: {0}")]
     Clip(String),
+    /// Matches of points that can't be, or a file of them that is damaged or cut off.
+    #[error("not a clip of point matches: {0}")]
+    Matches(String),
     /// A frame that is not in a clip.
     #[error("frame {found} is not in the clip of frames {start} to {end}")]
     Frame {

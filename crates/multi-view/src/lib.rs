@@ -3,6 +3,7 @@
 //! - [`assign`]: which file, or folder of an archive, belongs to which camera, told from names.
 //! - [`CameraRecord`]: a camera as jobs hand it on, to the bit.
 //! - [`SilhouetteClip`], [`ClipWriter`]: a stretch of silhouettes in a few kilobytes a second.
+//! - [`MatchClip`], [`MatchClipWriter`]: points of a camera that were found again from frame to frame.
 //! - [`Parameters`]: all that decides the result.
 //!
 //! ```
@@ -22,12 +23,15 @@ mod assign;
 mod camera;
 mod clip;
 mod error;
+mod matches;
+mod packed;
 mod parameters;
 
 pub use assign::{Assigned, assign};
 pub use camera::CameraRecord;
 pub use clip::{ClipWriter, SilhouetteClip};
 pub use error::Error;
+pub use matches::{MatchClip, MatchClipWriter};
 pub use parameters::Parameters;
 
 /// Result of this crate.
