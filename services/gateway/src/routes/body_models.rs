@@ -1,28 +1,17 @@
-//! Body models: made, built, shown, downloaded, deleted. `shipped` is always there.
+//! Body models: made, shown, deleted. `shipped` is always there.
 
-use axum::{
-    Json,
-    extract::State,
-    http::{HeaderMap, StatusCode, header},
-    response::{IntoResponse, Response},
-};
-use body::{BodyModel as Model, Sex, Wanted};
+use axum::{Json, extract::State, http::StatusCode};
 use body_files::shipped;
 use chrono::{DateTime, Utc};
-use payloads::{BUILD_BODY_MODEL, BodyModelFile, BodyModelName, BuildBodyModel, SHIPPED};
-use queue::{NewRun, ProjectId, RunId};
+use payloads::{BodyModelFile, SHIPPED};
+use queue::RunId;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sqlx::PgConnection;
-use utoipa::{IntoParams, ToSchema};
+use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::{
-    download::{self, Object},
-    lookup::{self, Latest, Lock},
-    runs::{self, Run},
-    start::{inputs, start},
-};
+use super::lookup::{self, Latest, Lock};
 use crate::{
     App,
     access::{Reader, Writer},
@@ -270,189 +259,6 @@ pub(super) async fn show(
 ) -> Result<Json<BodyModel>> {
     let mut db = app.db.acquire().await?;
     Ok(Json(find(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?))
-}
-
-/// How a body model is to be built; everything may be left out.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct NewBodyModelBuild {
-    /// most principal components, 1 to 20; 20 when left out
-    #[schema(example = 20)]
-    components: Option<usize>,
-    /// metres of one unit of the scans; 1 when left out, for arrays whichever of 1, 0.01, 0.001 and 0.0001 makes people
-    #[schema(example = 0.001)]
-    metres_per_unit: Option<f64>,
-}
-
-/// Build a body model
-///
-/// From the scans uploaded to it, which are fixed from then on. Answers at once (202) with the run.
-#[utoipa::path(
-    post, path = "/v1/body-models/{body_model}/build", tag = "body models", request_body = NewBodyModelBuild,
-    params(
-        ("body_model" = String, Path, description = "id, name or name@version"),
-        ("Idempotency-Key" = Option<String>, Header, description = "the same key gives the same answer for a day"),
-    ),
-    responses((status = 202, body = Run, headers(("Location" = String, description = "the run")))),
-)]
-pub(super) async fn build(
-    State(app): State<App>,
-    Writer(caller): Writer,
-    Path(which): Path<String>,
-    Posted { body, request }: Posted<NewBodyModelBuild>,
-) -> Result<Answer> {
-    let project_id = caller.project_id;
-    let components = body.components.unwrap_or(body::MAX_COMPONENTS);
-    if !(1..=body::MAX_COMPONENTS).contains(&components) {
-        return Err(Error::Unprocessable(format!(
-            "components is {components}, expected 1 to {}",
-            body::MAX_COMPONENTS
-        )));
-    }
-    if let Some(metres) = body.metres_per_unit.filter(|metres| !(1e-6..=1e3).contains(metres)) {
-        return Err(Error::Unprocessable(format!("metres_per_unit is {metres}, expected 0.000001 to 1000")));
-    }
-    let mut tx = app.db.begin().await?;
-    if let Some(answer) = request.replay(&mut tx, project_id).await? {
-        return Ok(answer);
-    }
-    let model = find(&mut tx, project_id, &which, Latest::Any, Lock::Update).await?;
-    if !matches!(model.state.as_str(), "open" | "failed") {
-        return Err(Error::Conflict(format!(
-            "body model {}@{} is {}; make a new version to build another",
-            model.name, model.version, model.state
-        )));
-    }
-    let files = inputs(&mut tx, model.id).await?;
-    if files.is_empty() {
-        return Err(Error::Unprocessable(format!(
-            "body model {}@{} has no files; upload an archive of registered scans first",
-            model.name, model.version
-        )));
-    }
-    let payload = BuildBodyModel {
-        body_model: BodyModelName { id: model.id, name: model.name, version: model.version },
-        files,
-        components,
-        metres_per_unit: body.metres_per_unit,
-    };
-    let new = NewRun {
-        project_id: ProjectId(project_id),
-        kind: "body-model",
-        session_id: None,
-        parameters: serde_json::to_value(&payload)?,
-    };
-    let run_id = start(&mut tx, &new, BUILD_BODY_MODEL).await?;
-    sqlx::query("UPDATE body_models SET build_run_id = $2 WHERE id = $1")
-        .bind(model.id)
-        .bind(run_id)
-        .execute(&mut *tx)
-        .await?;
-    let run = runs::find(&mut tx, project_id, run_id).await?;
-    let answer = Answer::accepted(format!("/v1/runs/{run_id}"), &run)?;
-    request.commit(tx, project_id, answer).await
-}
-
-/// Download a body model
-///
-/// The file of a model that is ready: mean, components, rig and skin.
-#[utoipa::path(
-    get, path = "/v1/body-models/{body_model}/model", tag = "body models",
-    params(("body_model" = String, Path, description = "id, name (its latest version that is ready), name@version or shipped")),
-    responses((status = 200, content_type = "application/octet-stream"), (status = 206), (status = 304)),
-)]
-pub(super) async fn file(
-    State(app): State<App>,
-    Reader(caller): Reader,
-    Path(which): Path<String>,
-    headers: HeaderMap,
-) -> Result<Response> {
-    let mut db = app.db.acquire().await?;
-    let model = find(&mut db, caller.project_id, &which, Latest::Ready, Lock::None).await?;
-    drop(db);
-    let ready = model.ready()?;
-    let name = format!("{}-{}.marey-body", model.name, model.version);
-    let Some(store_key) = &ready.store_key else {
-        return Ok(whole(&name, "application/octet-stream", shipped().bytes.clone()));
-    };
-    let object = Object {
-        name: &name,
-        store_key,
-        bytes: model.bytes.unwrap_or_default(),
-        blake3: &ready.blake3,
-        media_type: "application/octet-stream",
-    };
-    download::send(&app, &headers, &object).await
-}
-
-/// Which body is wanted of a model; the mean when nothing is said.
-#[derive(Debug, Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub(crate) struct BodyQuery {
-    /// stature, metres
-    stature_m: Option<f64>,
-    /// mass, kilograms
-    mass_kg: Option<f64>,
-    /// age, years
-    age_years: Option<f64>,
-    /// `female` or `male`
-    sex: Option<String>,
-}
-
-/// Download a body of a model as GLB
-///
-/// With skeleton and skin, for Blender and three.js: the mean body, or the most probable one with the measurements said.
-#[utoipa::path(
-    get, path = "/v1/body-models/{body_model}/body.glb", tag = "body models",
-    params(
-        ("body_model" = String, Path, description = "id, name (its latest version that is ready), name@version or shipped"),
-        BodyQuery,
-    ),
-    responses((status = 200, content_type = "model/gltf-binary")),
-)]
-pub(super) async fn glb(
-    State(app): State<App>,
-    Reader(caller): Reader,
-    Path(which): Path<String>,
-    Query(query): Query<BodyQuery>,
-) -> Result<Response> {
-    let sex = match query.sex.as_deref() {
-        None => None,
-        Some("female") => Some(Sex::Female),
-        Some("male") => Some(Sex::Male),
-        Some(other) => {
-            return Err(Error::Unprocessable(format!("sex is {other:?}, expected female or male")));
-        }
-    };
-    let wanted =
-        Wanted { stature_m: query.stature_m, mass_kg: query.mass_kg, age_years: query.age_years, sex };
-    let mut db = app.db.acquire().await?;
-    let found = find(&mut db, caller.project_id, &which, Latest::Ready, Lock::None).await?;
-    drop(db);
-    let stored = match found.ready()?.store_key {
-        None => None,
-        Some(key) => Some(app.store.get(&key.parse()?, body::MAX_BYTES as u64).await?),
-    };
-    let made = tokio::task::spawn_blocking(move || -> Result<Vec<u8>> {
-        let model = match stored {
-            None => shipped().model.clone(),
-            Some(bytes) => {
-                Model::from_bytes(&bytes).map_err(|e| Error::Internal(format!("body model: {e}")))?.into()
-            }
-        };
-        let alpha = model.alpha_for(&wanted).map_err(|e| Error::Unprocessable(e.to_string()))?;
-        body_files::glb(&model, &model.shape(&alpha), None).map_err(|e| Error::Internal(e.to_string()))
-    });
-    let bytes = made.await.map_err(|e| Error::Internal(format!("task: {e}")))??;
-    Ok(whole(&format!("{}-{}.glb", found.name, found.version), "model/gltf-binary", bytes))
-}
-
-/// An answer that is a file which is in no store. Names of models need no quoting.
-fn whole(name: &str, media_type: &'static str, bytes: Vec<u8>) -> Response {
-    let disposition = format!("attachment; filename=\"{name}\"");
-    ([(header::CONTENT_TYPE, media_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)], bytes)
-        .into_response()
 }
 
 /// Delete a body model

@@ -1,27 +1,20 @@
-use axum::{
-    Json,
-    body::Body,
-    extract::State,
-    http::{HeaderMap, StatusCode},
-    response::Response,
-};
+//! Uploaded files, whosever they are: received, recorded, replaced and removed.
+
+use axum::{Json, body::Body, http::StatusCode};
 use chrono::{DateTime, Utc};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use sqlx::PgConnection;
 use store::{Key, Stored};
-use utoipa::{IntoParams, ToSchema};
+use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{
     body_models::{self, BodyModel},
-    download::{self, Object},
     lookup::{self, Latest, Lock, MotionDatabase},
 };
 use crate::{
     App,
-    access::{Reader, Writer},
     error::{Error, Result},
-    extract::{Path, Query},
     names::{self, FileRole},
     upload::{self, Announced, uninterrupted},
 };
@@ -48,17 +41,6 @@ pub(crate) struct File {
     pub store_key: String,
 }
 
-/// What the file is for.
-#[derive(Debug, Deserialize, IntoParams)]
-#[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
-pub(crate) struct PutQuery {
-    /// guessed from the name when left out: `.asf` skeleton; `.csv`, `.trc`, `.c3d` control points; `.amc`, `.bvh`
-    /// ground truth; `.toml`, `.json`, `.yml`, `.xml`, `.qca.txt` calibration; `.mp4`, `.mov`, `.avi`, `.mkv`, `.webm` video;
-    /// `.png`, `.jpg` plate; archives masks, or images or plates if their name says so
-    role: Option<FileRole>,
-}
-
 /// All files of a session or of a motion database, by name.
 pub(super) async fn of_owner(db: &mut PgConnection, owner: Uuid) -> Result<Vec<File>> {
     Ok(sqlx::query_as(
@@ -70,274 +52,17 @@ pub(super) async fn of_owner(db: &mut PgConnection, owner: Uuid) -> Result<Vec<F
     .await?)
 }
 
-/// List the files of a session
-#[utoipa::path(
-    get, path = "/v1/sessions/{session_id}/files", tag = "files",
-    params(("session_id" = Uuid, Path,)), responses((status = 200, body = Vec<File>)),
-)]
-pub(super) async fn list_of_session(
-    State(app): State<App>,
-    Reader(caller): Reader,
-    Path(session_id): Path<Uuid>,
-) -> Result<Json<Vec<File>>> {
-    let mut db = app.db.acquire().await?;
-    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
-    Ok(Json(of_owner(&mut db, session_id).await?))
-}
-
-/// Upload a file to a session
-///
-/// The body is the file's content. A `Content-Digest: sha-256=:<base64>:` header (RFC 9530) is checked; a file that
-/// is too large, has another checksum or breaks off is not kept. Another file of the same name is replaced (200), unless a
-/// run of the session goes on (409).
-#[utoipa::path(
-    put, path = "/v1/sessions/{session_id}/files/{name}", tag = "files",
-    params(
-        ("session_id" = Uuid, Path,), ("name" = String, Path, example = "points.csv"), PutQuery,
-        ("Content-Digest" = Option<String>, Header, description = "sha-256=:<base64>:"),
-    ),
-    request_body(content = String, content_type = "application/octet-stream"),
-    responses((status = 201, body = File), (status = 200, body = File, description = "replaced")),
-)]
-pub(super) async fn put_in_session(
-    State(app): State<App>,
-    Writer(caller): Writer,
-    Path((session_id, name)): Path<(Uuid, String)>,
-    Query(query): Query<PutQuery>,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<(StatusCode, Json<File>)> {
-    names::check_file_name(&name)?;
-    let role = query.role.or_else(|| FileRole::of_session_file(&name)).ok_or_else(|| {
-        Error::Unprocessable(format!("the role of {name:?} can't be told from its name; say ?role="))
-    })?;
-    if !role.fits_session_file(&name) {
-        return Err(Error::Unprocessable(format!(
-            "{name:?} can't have role {}: expected .csv, .trc or .c3d for control-points, .asf or .bvh for skeleton, \
-             .amc or .bvh for ground-truth, .toml, .json, .yml, .xml or .qca.txt for calibration, .mp4, .mov, .avi, .mkv or \
-             .webm for video, an archive for images and masks, a .png, a .jpg or an archive for plate",
-            role.as_str()
-        )));
-    }
-    let announced = Announced::read(&headers)?;
-    let mut db = app.db.acquire().await?;
-    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
-    drop(db);
-    let file_id = Uuid::now_v7();
-    let key = store::key::file(caller.project_id, session_id, file_id);
-    let upload = Upload { file_id, owner: Owner::Session(session_id), name, role, key };
-    receive(app, caller.project_id, upload, announced, body).await
-}
-
-/// Download a file of a session
-///
-/// `ETag` is the file's BLAKE3; a single `Range` is honoured.
-#[utoipa::path(
-    get, path = "/v1/sessions/{session_id}/files/{name}", tag = "files",
-    params(("session_id" = Uuid, Path,), ("name" = String, Path,)),
-    responses((status = 200, content_type = "application/octet-stream"), (status = 206), (status = 304)),
-)]
-pub(super) async fn get_of_session(
-    State(app): State<App>,
-    Reader(caller): Reader,
-    Path((session_id, name)): Path<(Uuid, String)>,
-    headers: HeaderMap,
-) -> Result<Response> {
-    let mut db = app.db.acquire().await?;
-    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
-    let files = of_owner(&mut db, session_id).await?;
-    drop(db);
-    let file = files.iter().find(|f| f.name == name).ok_or_else(|| Error::not_found("file", &name))?;
-    let object = Object {
-        name: &file.name,
-        store_key: &file.store_key,
-        bytes: file.bytes,
-        blake3: &file.blake3,
-        media_type: &file.media_type,
-    };
-    download::send(&app, &headers, &object).await
-}
-
-/// Delete a file of a session
-///
-/// Refused (409) while a run of the session goes on.
-#[utoipa::path(
-    delete, path = "/v1/sessions/{session_id}/files/{name}", tag = "files",
-    params(("session_id" = Uuid, Path,), ("name" = String, Path,)), responses((status = 204)),
-)]
-pub(super) async fn delete_of_session(
-    State(app): State<App>,
-    Writer(caller): Writer,
-    Path((session_id, name)): Path<(Uuid, String)>,
-) -> Result<StatusCode> {
-    uninterrupted(async move { remove(&app, caller.project_id, &Owner::Session(session_id), &name).await })
-        .await
-}
-
-/// List the files of a motion database
-#[utoipa::path(
-    get, path = "/v1/motion-databases/{motion_database}/files", tag = "motion databases",
-    params(("motion_database" = String, Path, description = "id, name or name@version")),
-    responses((status = 200, body = Vec<File>)),
-)]
-pub(super) async fn list_of_database(
-    State(app): State<App>,
-    Reader(caller): Reader,
-    Path(which): Path<String>,
-) -> Result<Json<Vec<File>>> {
-    let mut db = app.db.acquire().await?;
-    let database =
-        lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
-    Ok(Json(of_owner(&mut db, database.id).await?))
-}
-
-/// Upload a file to build a motion database from
-///
-/// An archive (zip, tar, tar.gz, tar.zst) of ASF and AMC or of BVH files, or such files one by one. As for sessions,
-/// `Content-Digest` is checked. Only while the database is `open` or `failed`.
-#[utoipa::path(
-    put, path = "/v1/motion-databases/{motion_database}/files/{name}", tag = "motion databases",
-    params(
-        ("motion_database" = String, Path, description = "id, name or name@version"),
-        ("name" = String, Path, example = "walks.zip"),
-        ("Content-Digest" = Option<String>, Header, description = "sha-256=:<base64>:"),
-    ),
-    request_body(content = String, content_type = "application/octet-stream"),
-    responses((status = 201, body = File), (status = 200, body = File, description = "replaced")),
-)]
-pub(super) async fn put_in_database(
-    State(app): State<App>,
-    Writer(caller): Writer,
-    Path((which, name)): Path<(String, String)>,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<(StatusCode, Json<File>)> {
-    names::check_file_name(&name)?;
-    if !FileRole::is_motion_file(&name) {
-        return Err(Error::Unprocessable(format!(
-            "{name:?} is no motion file: expected .zip, .tar, .tar.gz, .tar.zst, .asf, .amc or .bvh"
-        )));
-    }
-    let announced = Announced::read(&headers)?;
-    let mut db = app.db.acquire().await?;
-    let database =
-        lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
-    drop(db);
-    check_collects(&database)?;
-    let file_id = Uuid::now_v7();
-    let key = store::key::motion_database_input(database.id, file_id);
-    let upload =
-        Upload { file_id, owner: Owner::MotionDatabase(database.id), name, role: FileRole::Motion, key };
-    receive(app, caller.project_id, upload, announced, body).await
-}
-
-/// Delete a file of a motion database
-///
-/// Only while the database is `open` or `failed`.
-#[utoipa::path(
-    delete, path = "/v1/motion-databases/{motion_database}/files/{name}", tag = "motion databases",
-    params(("motion_database" = String, Path, description = "id, name or name@version"), ("name" = String, Path,)),
-    responses((status = 204)),
-)]
-pub(super) async fn delete_of_database(
-    State(app): State<App>,
-    Writer(caller): Writer,
-    Path((which, name)): Path<(String, String)>,
-) -> Result<StatusCode> {
-    let mut db = app.db.acquire().await?;
-    let database =
-        lookup::motion_database(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
-    drop(db);
-    let owner = Owner::MotionDatabase(database.id);
-    uninterrupted(async move { remove(&app, caller.project_id, &owner, &name).await }).await
-}
-
-/// List the files of a body model
-#[utoipa::path(
-    get, path = "/v1/body-models/{body_model}/files", tag = "body models",
-    params(("body_model" = String, Path, description = "id, name or name@version")),
-    responses((status = 200, body = Vec<File>)),
-)]
-pub(super) async fn list_of_body_model(
-    State(app): State<App>,
-    Reader(caller): Reader,
-    Path(which): Path<String>,
-) -> Result<Json<Vec<File>>> {
-    let mut db = app.db.acquire().await?;
-    let model = body_models::find(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
-    Ok(Json(of_owner(&mut db, model.id).await?))
-}
-
-/// Upload a file to learn a body model from
-///
-/// An archive (zip, tar, tar.gz, tar.zst) of registered scans, OBJ or PLY, or `vertices.npy` with `faces.npy`; or such files
-/// one by one, and beside them `rig.json`, `skin_joints.npy`, `skin_weights.npy`, `scans.csv`, `subjects.csv`. Only while the
-/// model is `open` or `failed`.
-#[utoipa::path(
-    put, path = "/v1/body-models/{body_model}/files/{name}", tag = "body models",
-    params(
-        ("body_model" = String, Path, description = "id, name or name@version"),
-        ("name" = String, Path, example = "scans.zip"),
-        ("Content-Digest" = Option<String>, Header, description = "sha-256=:<base64>:"),
-    ),
-    request_body(content = String, content_type = "application/octet-stream"),
-    responses((status = 201, body = File), (status = 200, body = File, description = "replaced")),
-)]
-pub(super) async fn put_in_body_model(
-    State(app): State<App>,
-    Writer(caller): Writer,
-    Path((which, name)): Path<(String, String)>,
-    headers: HeaderMap,
-    body: Body,
-) -> Result<(StatusCode, Json<File>)> {
-    names::check_file_name(&name)?;
-    if !FileRole::is_scan_file(&name) {
-        return Err(Error::Unprocessable(format!(
-            "{name:?} is no file of scans: expected .zip, .tar, .tar.gz, .tar.zst, .obj, .ply, .npy, rig.json or .csv"
-        )));
-    }
-    let announced = Announced::read(&headers)?;
-    let mut db = app.db.acquire().await?;
-    let model = body_models::find(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
-    drop(db);
-    check_collects_scans(&model)?;
-    let file_id = Uuid::now_v7();
-    let key = store::key::body_model_input(model.id, file_id);
-    let upload = Upload { file_id, owner: Owner::BodyModel(model.id), name, role: FileRole::Scans, key };
-    receive(app, caller.project_id, upload, announced, body).await
-}
-
-/// Delete a file of a body model
-///
-/// Only while the model is `open` or `failed`.
-#[utoipa::path(
-    delete, path = "/v1/body-models/{body_model}/files/{name}", tag = "body models",
-    params(("body_model" = String, Path, description = "id, name or name@version"), ("name" = String, Path,)),
-    responses((status = 204)),
-)]
-pub(super) async fn delete_of_body_model(
-    State(app): State<App>,
-    Writer(caller): Writer,
-    Path((which, name)): Path<(String, String)>,
-) -> Result<StatusCode> {
-    let mut db = app.db.acquire().await?;
-    let model = body_models::find(&mut db, caller.project_id, &which, Latest::Any, Lock::None).await?;
-    drop(db);
-    let owner = Owner::BodyModel(model.id);
-    uninterrupted(async move { remove(&app, caller.project_id, &owner, &name).await }).await
-}
-
 /// A file that is to come in.
-struct Upload {
-    file_id: Uuid,
-    owner: Owner,
-    name: String,
-    role: FileRole,
-    key: Key,
+pub(super) struct Upload {
+    pub file_id: Uuid,
+    pub owner: Owner,
+    pub name: String,
+    pub role: FileRole,
+    pub key: Key,
 }
 
 /// Receives a file to its end, whether or not the caller waits for it, and records it.
-async fn receive(
+pub(super) async fn receive(
     app: App,
     project_id: Uuid,
     upload: Upload,
@@ -354,7 +79,8 @@ async fn receive(
     .await
 }
 
-enum Owner {
+/// Whose a file is.
+pub(super) enum Owner {
     Session(Uuid),
     MotionDatabase(Uuid),
     BodyModel(Uuid),
@@ -420,7 +146,12 @@ async fn settle(
     }
 }
 
-async fn remove(app: &App, project_id: Uuid, owner: &Owner, name: &str) -> Result<StatusCode> {
+/// Removes a file, whether or not the caller waits for it.
+pub(super) async fn remove(app: App, project_id: Uuid, owner: Owner, name: String) -> Result<StatusCode> {
+    uninterrupted(async move { take_away(&app, project_id, &owner, &name).await }).await
+}
+
+async fn take_away(app: &App, project_id: Uuid, owner: &Owner, name: &str) -> Result<StatusCode> {
     let mut tx = app.db.begin().await?;
     let removed = take_out(&mut tx, project_id, owner, name).await?;
     tx.commit().await?;
@@ -471,7 +202,8 @@ async fn take_out(
     Ok(removed)
 }
 
-fn check_collects(database: &MotionDatabase) -> Result<()> {
+/// Refuses to change the files of a database that is built from them.
+pub(super) fn check_collects(database: &MotionDatabase) -> Result<()> {
     match database.state.as_str() {
         "open" | "failed" => Ok(()),
         state => Err(Error::Conflict(format!(
@@ -481,7 +213,8 @@ fn check_collects(database: &MotionDatabase) -> Result<()> {
     }
 }
 
-fn check_collects_scans(model: &BodyModel) -> Result<()> {
+/// The same for a body model.
+pub(super) fn check_collects_scans(model: &BodyModel) -> Result<()> {
     match model.state.as_str() {
         "open" | "failed" => Ok(()),
         state => Err(Error::Conflict(format!(

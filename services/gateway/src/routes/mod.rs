@@ -1,5 +1,7 @@
 //! The handlers, by noun.
 
+mod bodies;
+mod body_builds;
 mod body_models;
 mod builds;
 mod cameras;
@@ -14,7 +16,9 @@ mod me;
 mod operations;
 mod results;
 mod runs;
+mod session_files;
 mod sessions;
+mod source_files;
 mod start;
 
 use axum::{
@@ -36,23 +40,27 @@ pub(crate) fn described() -> OpenApiRouter<App> {
         .routes(routes!(me::show))
         .routes(routes!(sessions::create, sessions::list))
         .routes(routes!(sessions::show, sessions::delete))
-        .routes(routes!(files::list_of_session))
-        .routes(routes!(files::put_in_session, files::get_of_session, files::delete_of_session))
+        .routes(routes!(session_files::list_of_session))
+        .routes(routes!(
+            session_files::put_in_session,
+            session_files::get_of_session,
+            session_files::delete_of_session
+        ))
         .routes(routes!(start::reconstruction, runs::list_of_session))
         .routes(routes!(databases::create, databases::list))
         .routes(routes!(databases::show, databases::delete))
-        .routes(routes!(files::list_of_database))
-        .routes(routes!(files::put_in_database, files::delete_of_database))
+        .routes(routes!(source_files::list_of_database))
+        .routes(routes!(source_files::put_in_database, source_files::delete_of_database))
         .routes(routes!(databases::clips))
         .routes(routes!(builds::build))
         .routes(routes!(builds::train))
         .routes(routes!(body_models::create, body_models::list))
         .routes(routes!(body_models::show, body_models::delete))
-        .routes(routes!(body_models::build))
-        .routes(routes!(body_models::file))
-        .routes(routes!(body_models::glb))
-        .routes(routes!(files::list_of_body_model))
-        .routes(routes!(files::put_in_body_model, files::delete_of_body_model))
+        .routes(routes!(body_builds::build))
+        .routes(routes!(bodies::file))
+        .routes(routes!(bodies::glb))
+        .routes(routes!(source_files::list_of_body_model))
+        .routes(routes!(source_files::put_in_body_model, source_files::delete_of_body_model))
         .routes(routes!(runs::list))
         .routes(routes!(runs::show))
         .routes(routes!(runs::cancel))

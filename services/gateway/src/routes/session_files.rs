@@ -1,0 +1,140 @@
+//! The files of sessions.
+
+use axum::{
+    Json,
+    body::Body,
+    extract::State,
+    http::{HeaderMap, StatusCode},
+    response::Response,
+};
+use serde::Deserialize;
+use utoipa::IntoParams;
+use uuid::Uuid;
+
+use super::{
+    download::{self, Object},
+    files::{self, File, Owner},
+    lookup::{self, Lock},
+};
+use crate::{
+    App,
+    access::{Reader, Writer},
+    error::{Error, Result},
+    extract::{Path, Query},
+    names::{self, FileRole},
+    upload::Announced,
+};
+
+/// What the file is for.
+#[derive(Debug, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct PutQuery {
+    /// guessed from the name when left out: `.asf` skeleton; `.csv`, `.trc`, `.c3d` control points; `.amc`, `.bvh`
+    /// ground truth; `.toml`, `.json`, `.yml`, `.xml`, `.qca.txt` calibration; `.mp4`, `.mov`, `.avi`, `.mkv`, `.webm` video;
+    /// `.png`, `.jpg` plate; archives masks, or images or plates if their name says so
+    role: Option<FileRole>,
+}
+
+/// List the files of a session
+#[utoipa::path(
+    get, path = "/v1/sessions/{session_id}/files", tag = "files",
+    params(("session_id" = Uuid, Path,)), responses((status = 200, body = Vec<File>)),
+)]
+pub(super) async fn list_of_session(
+    State(app): State<App>,
+    Reader(caller): Reader,
+    Path(session_id): Path<Uuid>,
+) -> Result<Json<Vec<File>>> {
+    let mut db = app.db.acquire().await?;
+    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
+    Ok(Json(files::of_owner(&mut db, session_id).await?))
+}
+
+/// Upload a file to a session
+///
+/// The body is the file's content. A `Content-Digest: sha-256=:<base64>:` header (RFC 9530) is checked; a file that
+/// is too large, has another checksum or breaks off is not kept. Another file of the same name is replaced (200), unless a
+/// run of the session goes on (409).
+#[utoipa::path(
+    put, path = "/v1/sessions/{session_id}/files/{name}", tag = "files",
+    params(
+        ("session_id" = Uuid, Path,), ("name" = String, Path, example = "points.csv"), PutQuery,
+        ("Content-Digest" = Option<String>, Header, description = "sha-256=:<base64>:"),
+    ),
+    request_body(content = String, content_type = "application/octet-stream"),
+    responses((status = 201, body = File), (status = 200, body = File, description = "replaced")),
+)]
+pub(super) async fn put_in_session(
+    State(app): State<App>,
+    Writer(caller): Writer,
+    Path((session_id, name)): Path<(Uuid, String)>,
+    Query(query): Query<PutQuery>,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<(StatusCode, Json<File>)> {
+    names::check_file_name(&name)?;
+    let role = query.role.or_else(|| FileRole::of_session_file(&name)).ok_or_else(|| {
+        Error::Unprocessable(format!("the role of {name:?} can't be told from its name; say ?role="))
+    })?;
+    if !role.fits_session_file(&name) {
+        return Err(Error::Unprocessable(format!(
+            "{name:?} can't have role {}: expected .csv, .trc or .c3d for control-points, .asf or .bvh for skeleton, \
+             .amc or .bvh for ground-truth, .toml, .json, .yml, .xml or .qca.txt for calibration, .mp4, .mov, .avi, .mkv or \
+             .webm for video, an archive for images and masks, a .png, a .jpg or an archive for plate",
+            role.as_str()
+        )));
+    }
+    let announced = Announced::read(&headers)?;
+    let mut db = app.db.acquire().await?;
+    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
+    drop(db);
+    let file_id = Uuid::now_v7();
+    let key = store::key::file(caller.project_id, session_id, file_id);
+    let upload = files::Upload { file_id, owner: Owner::Session(session_id), name, role, key };
+    files::receive(app, caller.project_id, upload, announced, body).await
+}
+
+/// Download a file of a session
+///
+/// `ETag` is the file's BLAKE3; a single `Range` is honoured.
+#[utoipa::path(
+    get, path = "/v1/sessions/{session_id}/files/{name}", tag = "files",
+    params(("session_id" = Uuid, Path,), ("name" = String, Path,)),
+    responses((status = 200, content_type = "application/octet-stream"), (status = 206), (status = 304)),
+)]
+pub(super) async fn get_of_session(
+    State(app): State<App>,
+    Reader(caller): Reader,
+    Path((session_id, name)): Path<(Uuid, String)>,
+    headers: HeaderMap,
+) -> Result<Response> {
+    let mut db = app.db.acquire().await?;
+    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
+    let files = files::of_owner(&mut db, session_id).await?;
+    drop(db);
+    let file = files.iter().find(|f| f.name == name).ok_or_else(|| Error::not_found("file", &name))?;
+    let object = Object {
+        name: &file.name,
+        store_key: &file.store_key,
+        bytes: file.bytes,
+        blake3: &file.blake3,
+        media_type: &file.media_type,
+    };
+    download::send(&app, &headers, &object).await
+}
+
+/// Delete a file of a session
+///
+/// Refused (409) while a run of the session goes on.
+#[utoipa::path(
+    delete, path = "/v1/sessions/{session_id}/files/{name}", tag = "files",
+    params(("session_id" = Uuid, Path,), ("name" = String, Path,)), responses((status = 204)),
+)]
+pub(super) async fn delete_of_session(
+    State(app): State<App>,
+    Writer(caller): Writer,
+    Path((session_id, name)): Path<(Uuid, String)>,
+) -> Result<StatusCode> {
+    files::remove(app, caller.project_id, Owner::Session(session_id), name).await
+}
