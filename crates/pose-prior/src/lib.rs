@@ -1,0 +1,18 @@
+//! Training poses of the morphable body out of recorded motion: what the Parzen prior of a particle search is made of (method
+//! §5; MM eq. 15, "about 100 samples from different motions").
+//!
+//! [`recorded_poses`] and [`database_poses`] bring recordings of the CMU skeleton to the body's rig; [`covering`] chooses a few
+//! poses that stand for all. [`training_poses`] does both.
+//!
+//! Metres, radians, y up; poses have shape `[dofs]` of the body's rig.
+
+mod covering;
+mod error;
+mod recorded;
+
+pub use covering::covering;
+pub use error::Error;
+pub use recorded::{database_poses, recorded_poses, training_poses};
+
+/// Result of the fallible functions of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
