@@ -1,0 +1,86 @@
+//! The region of the person in grey.
+
+use model::{Image, Silhouette};
+
+/// Larger regions are reduced by two along each side until they are smaller, pixels: work and memory are bounded.
+const MAX_PIXELS: usize = 1_600_000;
+/// Pixels around the person that are taken with it: what the widest Gaussian of the first octave reaches.
+const AROUND: usize = 8;
+
+/// Grey values of a region and where the person is in it.
+#[derive(Debug, Default)]
+pub struct Grey {
+    pub width: usize,
+    pub height: usize,
+    /// pixel of the picture that the first value stands for, its centre
+    pub origin: [f64; 2],
+    /// pixels of the picture from value to value
+    pub step: f64,
+    /// 0 is black, 1 white; the person's mean outside the person, so that nothing depends on the background; shape
+    /// `[height, width]`
+    pub values: Vec<f32>,
+    /// 1 where the person is, shape `[height, width]`
+    pub inside: Vec<u8>,
+}
+
+impl Grey {
+    /// Reads the region of the person; `false` if nobody is there. What lies outside picture or silhouette is no person.
+    pub fn read(&mut self, image: &Image, silhouette: &Silhouette) -> bool {
+        let Some([left, top, right, bottom]) = silhouette.bounds() else { return false };
+        let (right, bottom) = (right.min(image.width()), bottom.min(image.height()));
+        if left >= right || top >= bottom {
+            return false;
+        }
+        let [left, top] = [left, top].map(|side| side.saturating_sub(AROUND));
+        let (right, bottom) = ((right + AROUND).min(image.width()), (bottom + AROUND).min(image.height()));
+        let mut block = 1;
+        let size = |block: usize| [(right - left) / block, (bottom - top) / block];
+        while size(block)[0] * size(block)[1] > MAX_PIXELS {
+            block *= 2;
+        }
+        [self.width, self.height] = size(block);
+        if self.width == 0 || self.height == 0 {
+            return false;
+        }
+        self.step = block as f64;
+        let to_centre = (block - 1) as f64 / 2.0;
+        self.origin = [left, top].map(|side| side as f64 + to_centre);
+        self.values.clear();
+        self.inside.clear();
+        for y in 0..self.height {
+            for x in 0..self.width {
+                let (mut sum, mut all) = (0.0, true);
+                for dy in 0..block {
+                    let from = 3 * (left + x * block);
+                    let row = &image.row(top + y * block + dy)[from..from + 3 * block];
+                    sum += row.as_chunks::<3>().0.iter().map(luminance).sum::<f32>();
+                }
+                for (dx, dy) in (0..block).flat_map(|dy| (0..block).map(move |dx| (dx, dy))) {
+                    let (x, y) = (left + x * block + dx, top + y * block + dy);
+                    all &= silhouette.contains(x as isize, y as isize);
+                }
+                self.values.push(sum / (block * block) as f32);
+                self.inside.push(u8::from(all));
+            }
+        }
+        self.fill_background()
+    }
+
+    /// Gives the background the person's mean; `false` without a person.
+    fn fill_background(&mut self) -> bool {
+        let (mut sum, mut count) = (0.0, 0usize);
+        for (value, &inside) in self.values.iter().zip(&self.inside) {
+            sum += f64::from(value * f32::from(inside));
+            count += usize::from(inside);
+        }
+        let mean = (sum / count.max(1) as f64) as f32;
+        for (value, &inside) in self.values.iter_mut().zip(&self.inside) {
+            *value = if inside == 1 { *value } else { mean };
+        }
+        count > 0
+    }
+}
+
+fn luminance([red, green, blue]: &[u8; 3]) -> f32 {
+    (0.299 * f32::from(*red) + 0.587 * f32::from(*green) + 0.114 * f32::from(*blue)) * (1.0 / 255.0)
+}
