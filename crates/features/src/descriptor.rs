@@ -3,7 +3,9 @@
 //! Samples lie on a grid that is turned with the feature and as wide as its Gaussian says, four to a bin along each side, so
 //! that their weights and their shares of the bins are the same for all features.
 
-use crate::scale_space::Octave;
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::{orientation::angle, scale_space::Octave};
 
 /// Histograms of 4 × 4 places and 8 directions, each number in steps of 1/512 of the length of all, shape `[4, 4, 8]`.
 pub type Descriptor = [u8; 128];
@@ -66,51 +68,75 @@ impl Grid {
         let first = self.offsets[0] * SAMPLES_A_PLACE as f32 - 1.0;
         let values = &octave.layers[layer];
         let farthest = [octave.width, octave.height].map(|side| (side - 1) as f32);
-        let at = |row: usize, column: usize| {
-            let (v, u) = (first + row as f32, first + column as f32);
-            [0, 1].map(|axis| (place[axis] + u * right[axis] + v * down[axis]).clamp(0.0, farthest[axis]))
-        };
+        let mut inside = [[0.0; SIDE]; SIDE];
         for (row, line) in self.values.iter_mut().enumerate() {
+            let v = first + row as f32;
+            let start = [place[0] + v * down[0], place[1] + v * down[1]];
             for (column, value) in line.iter_mut().enumerate() {
-                *value = sample(values, [octave.width, octave.height], at(row, column));
-            }
-        }
-        // places outside take what is outside, directions go round
-        let mut bins = [[[0.0f32; DIRECTIONS]; PLACES + 2]; PLACES + 2];
-        for row in 0..SIDE {
-            let weight = self.weights[row];
-            let (above, here, below) = (&self.values[row], &self.values[row + 1], &self.values[row + 2]);
-            for column in 0..SIDE {
-                let [x, y] = at(row + 1, column + 1).map(|x| (x + 0.5) as usize);
-                if octave.inside[y * octave.width + x] == 0 {
-                    continue;
-                }
-                let across = here[column + 2] - here[column];
-                let down = below[column + 1] - above[column + 1];
-                let length = weight * self.weights[column] * (across * across + down * down).sqrt();
-                let turn =
-                    crate::orientation::angle(across, down) * (DIRECTIONS as f32 / std::f32::consts::TAU);
-                let whole = turn as usize;
-                let share = turn - whole as f32;
-                let directions = [whole % DIRECTIONS, (whole + 1) % DIRECTIONS];
-                let (place_v, place_u) = (self.places[row], self.places[column]);
-                for (v, of_row) in [(place_v, 1.0 - self.shares[row]), (place_v + 1, self.shares[row])] {
-                    for (u, of_both) in [
-                        (place_u, (1.0 - self.shares[column]) * of_row * length),
-                        (place_u + 1, self.shares[column] * of_row * length),
-                    ] {
-                        bins[v][u][directions[0]] += of_both * (1.0 - share);
-                        bins[v][u][directions[1]] += of_both * share;
-                    }
+                let u = first + column as f32;
+                let x = (start[0] + u * right[0]).clamp(0.0, farthest[0]);
+                let y = (start[1] + u * right[1]).clamp(0.0, farthest[1]);
+                *value = sample(values, [octave.width, octave.height], [x, y]);
+                if (1..=SIDE).contains(&row) && (1..=SIDE).contains(&column) {
+                    let at = (y + 0.5) as usize * octave.width + (x + 0.5) as usize;
+                    inside[row - 1][column - 1] = f32::from(octave.inside[at]);
                 }
             }
         }
+        let bins = Arch::new().dispatch(Sum { grid: self, inside: &inside });
         let mut numbers = [0.0; PLACES * PLACES * DIRECTIONS];
         for (i, number) in numbers.iter_mut().enumerate() {
             let (place, direction) = (i / DIRECTIONS, i % DIRECTIONS);
             *number = bins[1 + place / PLACES][1 + place % PLACES][direction];
         }
         quantised(numbers)
+    }
+}
+
+/// Directions in places, those outside included.
+type Bins = [[[f32; DIRECTIONS]; PLACES + 2]; PLACES + 2];
+
+/// The sums of all samples that are inside.
+struct Sum<'a> {
+    grid: &'a Grid,
+    /// 1 where the person is
+    inside: &'a [[f32; SIDE]; SIDE],
+}
+
+impl WithSimd for Sum<'_> {
+    type Output = Bins;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Bins {
+        let Self { grid, inside } = self;
+        let mut bins = [[[0.0; DIRECTIONS]; PLACES + 2]; PLACES + 2];
+        for row in 0..SIDE {
+            let (above, here, below) = (&grid.values[row], &grid.values[row + 1], &grid.values[row + 2]);
+            let (mut lengths, mut turns) = ([0.0f32; SIDE], [0.0f32; SIDE]);
+            for i in 0..SIDE {
+                let (across, down) = (here[i + 2] - here[i], below[i + 1] - above[i + 1]);
+                lengths[i] = inside[row][i] * grid.weights[i] * (across * across + down * down).sqrt();
+                turns[i] = angle(across, down) * (DIRECTIONS as f32 / std::f32::consts::TAU);
+            }
+            let (weight, place, share) = (grid.weights[row], grid.places[row], grid.shares[row]);
+            for i in 0..SIDE {
+                let whole = turns[i] as usize;
+                let turn = turns[i] - whole as f32;
+                let directions = [whole % DIRECTIONS, (whole + 1) % DIRECTIONS];
+                for (v, of_row) in [(place, weight * (1.0 - share)), (place + 1, weight * share)] {
+                    let length = of_row * lengths[i];
+                    let column = grid.places[i];
+                    for (u, of_both) in
+                        [(column, (1.0 - grid.shares[i]) * length), (column + 1, grid.shares[i] * length)]
+                    {
+                        let bins = &mut bins[v][u];
+                        bins[directions[0]] += of_both * (1.0 - turn);
+                        bins[directions[1]] += of_both * turn;
+                    }
+                }
+            }
+        }
+        bins
     }
 }
 

@@ -1,6 +1,7 @@
 //! Extrema of the differences of Gaussians, to a part of a pixel.
 
 use nalgebra::{Matrix3, Vector3};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::{
     Options,
@@ -26,6 +27,8 @@ pub struct Extremum {
 #[derive(Debug, Default)]
 pub struct Differences {
     layers: [Vec<f32>; LAYERS - 1],
+    /// 1 where a pixel of a row may be an extremum
+    marks: Vec<u8>,
 }
 
 /// An extremum moves to a neighbouring pixel so often at most before it is given up.
@@ -47,13 +50,23 @@ impl Differences {
         let least = 0.8 * options.contrast as f32;
         for layer in 1..=SCALES {
             for y in 1..octave.height - 1 {
+                let start = y * width;
+                let line = |layer: usize, y: usize| &self.layers[layer][y * width..(y + 1) * width];
+                self.marks.resize(width, 0);
+                Arch::new().dispatch(Mark {
+                    lines: [
+                        line(layer, y),
+                        line(layer, y - 1),
+                        line(layer, y + 1),
+                        line(layer - 1, y),
+                        line(layer + 1, y),
+                    ],
+                    least,
+                    inside: &octave.well_inside[start..start + width],
+                    marks: &mut self.marks[..width],
+                });
                 for x in 1..width - 1 {
-                    let at = y * width + x;
-                    let value = self.layers[layer][at];
-                    if value.abs() < least || octave.well_inside[at] == 0 {
-                        continue;
-                    }
-                    if self.is_extremum(layer, at, width) {
+                    if self.marks[x] != 0 && self.is_extremum(layer, start + x, width) {
                         found.extend(self.refine(octave, index, layer, [x, y], options));
                     }
                 }
@@ -145,5 +158,40 @@ impl Differences {
             }
         }
         None
+    }
+}
+
+/// Marks the pixels of a row that are high enough and no lower (or no higher) than six of their 26 neighbours.
+struct Mark<'a> {
+    /// the row; above and below; in the finer and the wider layer
+    lines: [&'a [f32]; 5],
+    least: f32,
+    inside: &'a [u8],
+    marks: &'a mut [u8],
+}
+
+impl WithSimd for Mark<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let Self { lines: [here, above, below, finer, wider], least, inside, marks } = self;
+        let inner = marks.len() - 2;
+        let (left, right) = (&here[..inner], &here[2..][..inner]);
+        let [here, above, below, finer, wider] =
+            [here, above, below, finer, wider].map(|line| &line[1..][..inner]);
+        let (inside, marks) = (&inside[1..][..inner], &mut marks[1..][..inner]);
+        for i in 0..inner {
+            let around = [left[i], right[i], above[i], below[i], finer[i], wider[i]];
+            let (mut high, mut low) = (around[0], around[0]);
+            for other in &around[1..] {
+                high = if *other > high { *other } else { high };
+                low = if *other < low { *other } else { low };
+            }
+            let value = here[i];
+            let is_peak = (value >= least) & (value >= high);
+            let is_pit = (value <= -least) & (value <= low);
+            marks[i] = inside[i] & u8::from(is_peak | is_pit);
+        }
     }
 }

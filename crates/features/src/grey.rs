@@ -48,20 +48,20 @@ impl Grey {
         self.values.clear();
         self.inside.clear();
         for y in 0..self.height {
-            for x in 0..self.width {
-                let (mut sum, mut all) = (0.0, true);
-                for dy in 0..block {
-                    let from = 3 * (left + x * block);
-                    let row = &image.row(top + y * block + dy)[from..from + 3 * block];
-                    sum += row.as_chunks::<3>().0.iter().map(luminance).sum::<f32>();
-                }
-                for (dx, dy) in (0..block).flat_map(|dy| (0..block).map(move |dx| (dx, dy))) {
-                    let (x, y) = (left + x * block + dx, top + y * block + dy);
-                    all &= silhouette.contains(x as isize, y as isize);
-                }
-                self.values.push(sum / (block * block) as f32);
-                self.inside.push(u8::from(all));
+            if block == 1 {
+                let row = image.row(top + y)[3 * left..3 * (left + self.width)].as_chunks::<3>().0;
+                self.values.extend(row.iter().map(luminance));
+            } else {
+                self.values
+                    .extend((0..self.width).map(|x| mean(image, left + x * block, top + y * block, block)));
             }
+            let is_inside = |x: usize| {
+                let pixels = (0..block).flat_map(|dy| (0..block).map(move |dx| (dx, dy)));
+                pixels
+                    .map(|(dx, dy)| bit(silhouette, left + x * block + dx, top + y * block + dy))
+                    .fold(1, |a, b| a & b)
+            };
+            self.inside.extend((0..self.width).map(is_inside));
         }
         self.fill_background()
     }
@@ -79,6 +79,22 @@ impl Grey {
         }
         count > 0
     }
+}
+
+/// Mean of a block of pixels.
+fn mean(image: &Image, left: usize, top: usize, block: usize) -> f32 {
+    let of_row = |y: usize| -> f32 {
+        image.row(y)[3 * left..3 * (left + block)].as_chunks::<3>().0.iter().map(luminance).sum()
+    };
+    (top..top + block).map(of_row).sum::<f32>() / (block * block) as f32
+}
+
+/// 1 where the person is.
+fn bit(silhouette: &Silhouette, x: usize, y: usize) -> u8 {
+    if x >= silhouette.width() || y >= silhouette.height() {
+        return 0;
+    }
+    (silhouette.row(y)[x / 64] >> (x % 64) & 1) as u8
 }
 
 fn luminance([red, green, blue]: &[u8; 3]) -> f32 {

@@ -1,8 +1,6 @@
 //! Which way a feature is turned (Lowe's section 5).
 
-use crate::scale_space::Octave;
-
-use crate::extrema::Extremum;
+use crate::{extrema::Extremum, scale_space::Octave};
 
 const BINS: usize = 36;
 /// Peaks this high beside the highest are directions of the feature as well.

@@ -143,9 +143,6 @@ fn blur(from: &[f32], [width, height]: [usize; 2], sigma: f64, buffers: &mut Buf
     });
 }
 
-/// Pixels that are summed at a time.
-const CHUNK: usize = 32;
-
 struct Blur<'a> {
     from: &'a [f32],
     width: usize,
@@ -162,7 +159,7 @@ impl WithSimd for Blur<'_> {
 
     /// Nothing is fused, so that sums are the same on every processor.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self { from, width, height, kernel, row, rows, to } = self;
         let radius = kernel.len() - 1;
         for (from, out) in from.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
@@ -170,43 +167,59 @@ impl WithSimd for Blur<'_> {
             row[radius..radius + width].copy_from_slice(from);
             row[radius + width..].fill(from[width - 1]);
             let row = &*row;
-            weigh(kernel, out, |i| (&row[radius - i..], &row[radius + i..]));
+            weigh(simd, kernel, out, |i| (&row[radius - i..], &row[radius + i..]));
         }
         let rows = &*rows;
         for (y, out) in to.chunks_exact_mut(width).enumerate() {
             let row = |y: usize| &rows[y * width..];
-            weigh(kernel, out, |i| (row(y.saturating_sub(i)), row((y + i).min(height - 1))));
+            weigh(simd, kernel, out, |i| (row(y.saturating_sub(i)), row((y + i).min(height - 1))));
         }
     }
 }
 
+/// Registers that are summed in at a time.
+const REGISTERS: usize = 4;
+
 /// Sums of pairs of lines, each pair with its weight.
 #[inline(always)]
-fn weigh<'a>(kernel: &[f32], out: &mut [f32], pair: impl Fn(usize) -> (&'a [f32], &'a [f32])) {
+fn weigh<'a, S: Simd>(
+    simd: S,
+    kernel: &[f32],
+    out: &mut [f32],
+    pair: impl Fn(usize) -> (&'a [f32], &'a [f32]),
+) {
     let width = out.len();
-    let (chunks, rest) = out.as_chunks_mut::<CHUNK>();
-    for (index, out) in chunks.iter_mut().enumerate() {
-        let at = index * CHUNK;
-        let middle = &pair(0).0[at..at + CHUNK];
-        let mut sums = [0.0; CHUNK];
-        for lane in 0..CHUNK {
-            sums[lane] = kernel[0] * middle[lane];
-        }
-        for (i, weight) in kernel.iter().enumerate().skip(1) {
-            let (a, b) = pair(i);
-            let (a, b) = (&a[at..at + CHUNK], &b[at..at + CHUNK]);
-            for lane in 0..CHUNK {
-                sums[lane] += weight * (a[lane] + b[lane]);
+    let chunk = REGISTERS * S::F32_LANES;
+    if width < chunk {
+        for (at, out) in out.iter_mut().enumerate() {
+            *out = kernel[0] * pair(0).0[at];
+            for (i, weight) in kernel.iter().enumerate().skip(1) {
+                let (a, b) = pair(i);
+                *out += weight * (a[at] + b[at]);
             }
         }
-        *out = sums;
+        return;
     }
-    for (out, at) in rest.iter_mut().zip(width / CHUNK * CHUNK..) {
-        *out = kernel[0] * pair(0).0[at];
+    for at in (0..width).step_by(chunk) {
+        // the last ones are summed twice where the width is no multiple
+        let at = at.min(width - chunk);
+        let (middle, _) = S::as_simd_f32s(&pair(0).0[at..at + chunk]);
+        let weight = simd.splat_f32s(kernel[0]);
+        let mut sums = [simd.splat_f32s(0.0); REGISTERS];
+        for r in 0..REGISTERS {
+            sums[r] = simd.mul_f32s(weight, middle[r]);
+        }
         for (i, weight) in kernel.iter().enumerate().skip(1) {
             let (a, b) = pair(i);
-            *out += weight * (a[at] + b[at]);
+            let (a, _) = S::as_simd_f32s(&a[at..at + chunk]);
+            let (b, _) = S::as_simd_f32s(&b[at..at + chunk]);
+            let weight = simd.splat_f32s(*weight);
+            for r in 0..REGISTERS {
+                sums[r] = simd.add_f32s(sums[r], simd.mul_f32s(weight, simd.add_f32s(a[r], b[r])));
+            }
         }
+        let (out, _) = S::as_mut_simd_f32s(&mut out[at..at + chunk]);
+        out[..REGISTERS].copy_from_slice(&sums);
     }
 }
 
