@@ -24,6 +24,26 @@ pub struct Parameters {
     pub hull_voxel_m: f64,
     /// how silhouettes are told from the background
     pub background: background::Parameters,
+    /// the person is followed through all frames; otherwise they are found in the first ones only
+    pub track: bool,
+    /// frames a second, where no video tells, or tells it wrong
+    pub frame_rate: Option<f64>,
+    /// frames that are tracked in one piece; each piece begins with a key frame of its own
+    pub chunk_frames: usize,
+    /// frames that a piece goes on into the next, over which poses go from one to the other
+    pub overlap_frames: usize,
+    /// particles of the search for what is misaligned; 0: local optimisation alone
+    pub particles: usize,
+    /// iterations of that search
+    pub iterations: usize,
+    /// known poses guide that search
+    pub prior: bool,
+    /// pictures are searched for points that can be followed; nothing comes of it where there are only masks
+    pub texture: bool,
+    /// what the random numbers of that search come from
+    pub seed: u64,
+    /// a video of every camera with the body's outline
+    pub overlay: bool,
 }
 
 impl Default for Parameters {
@@ -38,6 +58,16 @@ impl Default for Parameters {
             least_overlap: 0.72,
             hull_voxel_m: 0.01,
             background: background::Parameters::default(),
+            track: true,
+            frame_rate: None,
+            chunk_frames: 150,
+            overlap_frames: 10,
+            particles: 25,
+            iterations: 10,
+            prior: true,
+            texture: true,
+            seed: 0,
+            overlay: true,
         }
     }
 }
@@ -54,11 +84,35 @@ impl Parameters {
             ("shape_frames", self.shape_frames, 1..=16, "1 to 16"),
             ("shape_step", self.shape_step, 1..=10_000, "1 to 10000"),
             ("largest_side", self.largest_side as usize, 64..=8192, "64 to 8192 pixels"),
+            ("chunk_frames", self.chunk_frames, 5..=3000, "5 to 3000"),
+            ("overlap_frames", self.overlap_frames, 0..=300, "0 to 300"),
+            ("particles", self.particles, 0..=2000, "2 to 2000, or 0 for none"),
+            ("iterations", self.iterations, 1..=200, "1 to 200"),
         ];
         for (name, found, range, expected) in whole {
             if !range.contains(&found) {
                 return Err(Error::Parameter { name, found: found.to_string(), expected });
             }
+        }
+        if self.particles == 1 {
+            let expected = "2 to 2000, or 0 for none";
+            return Err(Error::Parameter { name: "particles", found: "1".into(), expected });
+        }
+        if self.overlap_frames >= self.chunk_frames {
+            let found = self.overlap_frames.to_string();
+            return Err(Error::Parameter {
+                name: "overlap_frames",
+                found,
+                expected: "less than chunk_frames",
+            });
+        }
+        if let Some(rate) = self.frame_rate.filter(|rate| !(1.0..=1000.0).contains(rate)) {
+            let found = rate.to_string();
+            return Err(Error::Parameter {
+                name: "frame_rate",
+                found,
+                expected: "1 to 1000 frames a second",
+            });
         }
         if !(0.002..=0.1).contains(&self.hull_voxel_m) {
             let found = self.hull_voxel_m.to_string();

@@ -7,12 +7,19 @@ mod augment;
 mod body_model;
 mod cameras;
 mod database;
+mod run_report;
+mod silhouettes;
 
 pub use augment::{Augment, Error};
 pub use body_model::{BUILD_BODY_MODEL, BodyModelFile, BodyModelName, BuildBodyModel, SHIPPED};
 pub use cameras::{PLAN_MULTI_VIEW, PlanMultiView};
 pub use database::{
     MotionDatabaseFile, MotionDatabaseName, PLAN_MOTION_DATABASE, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm,
+};
+
+pub use run_report::{Code, FileReport, MultiViewReport, SessionReport, TrackingParts};
+pub use silhouettes::{
+    CameraReport, ClipPlace, Members, Source, SourceKind, clip_name, file_part, picture_name, report_name,
 };
 
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! Computation away from the async threads.
 
-use tokio::task::JoinError;
+use tokio::{sync::Semaphore, task::JoinError};
 
 /// Runs `work` on a thread that may block, and waits for it. A panic in it goes on here, where the worker loop or
 /// the gRPC server catches it.
@@ -11,5 +11,24 @@ pub async fn run<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -
         Err(Ok(panic)) => std::panic::resume_unwind(panic),
         // The runtime is being dropped, and this task with it: never continue.
         Err(Err(_)) => std::future::pending().await,
+    }
+}
+
+/// Calls that compute at once: one a core, the rest wait.
+#[derive(Debug)]
+pub struct Slots(Semaphore);
+
+impl Default for Slots {
+    fn default() -> Self {
+        Self(Semaphore::new(std::thread::available_parallelism().map_or(1, usize::from)))
+    }
+}
+
+impl Slots {
+    /// [`run`], when a slot is free.
+    pub async fn run<T: Send + 'static>(&self, work: impl FnOnce() -> T + Send + 'static) -> T {
+        // A failure to get a slot would mean that the semaphore was closed, which nobody does.
+        let _slot = self.0.acquire().await;
+        run(work).await
     }
 }

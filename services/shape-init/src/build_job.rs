@@ -9,7 +9,7 @@ use payloads::{BUILD_BODY_MODEL, BodyModelName, BuildBodyModel, InputFile};
 use queue::{Handler, JobContext, JobError, Outcome};
 use serde::Serialize;
 use serde_json::{Value, json};
-use service::{compute, objects};
+use service::{FileError, compute, objects};
 use sqlx::{PgConnection, types::Json};
 use store::{Stored, key};
 
@@ -53,7 +53,7 @@ impl Handler for BuildHandler {
 
     async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
         let request: BuildBodyModel = job.payload()?;
-        let (store, id) = (&self.shared.store, request.body_model.id);
+        let (store, id) = (&self.shared.resources.store, request.body_model.id);
         objects::clean_up_earlier_attempts(store, &job).await;
         let own = key::body_model_job_prefix(id, job.id().0);
         objects::clean_up_earlier_attempts_under(store, &job, &own).await;
@@ -104,20 +104,20 @@ impl Handler for BuildHandler {
 impl BuildHandler {
     /// All files that models are learned from, out of all uploads.
     async fn unpack(&self, job: &JobContext, files: &[InputFile]) -> Result<Vec<Entry>, JobError> {
-        let memory = &self.shared.memory;
+        let resources = &self.shared.resources;
+        let memory = &resources.memory;
         let mut left = memory.max_build_bytes;
         let mut entries = Vec::new();
         for (done, file) in files.iter().enumerate() {
             job.check()?;
             job.progress(0.3 * done as f64 / files.len() as f64, format!("unpacking {}", file.name));
-            let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
-            let bytes = objects::read(&self.shared.store, input, memory.max_object_bytes).await?;
+            let bytes = resources.read_file(file, memory.max_object_bytes).await?;
             let (name, total_bytes) = (file.name.clone(), left);
             let unpacked = compute::run(move || -> Result<Vec<Entry>, InputError> {
                 let limits = Limits { total_bytes, ..Limits::default() };
                 let is_single = body_files::is_used(&name);
                 let mut entries = archive::entries_where(&name, &bytes, &limits, body_files::is_used)
-                    .map_err(InputError::in_file(&name))?;
+                    .map_err(FileError::in_file(&name))?;
                 if !is_single {
                     entries.iter_mut().for_each(|entry| entry.name.insert_str(0, &format!("{name}/")));
                 }

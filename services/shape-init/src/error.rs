@@ -1,20 +1,17 @@
 //! What is wrong with a session's files or with a question.
 
+use camera_jobs::ModelError;
 use proto::ErrorCode;
 use queue::JobError;
+use service::FileError;
 
 /// Something about the input that only its owner can mend. The message is for them.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputError {
-    /// A file can't be read.
-    #[error("{file}: {source}")]
-    File {
-        /// Name of the file.
-        file: String,
-        /// Where and what.
-        source: formats::Error,
-    },
+    /// A file can't be read, or something else is there than should be.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A video can't be read.
     #[error("{message}")]
     Video {
@@ -28,28 +25,6 @@ pub enum InputError {
         file: String,
         /// Why not.
         source: background::Error,
-    },
-    /// Something else than there should be.
-    #[error("{what}: found {found}, expected {expected}")]
-    Unexpected {
-        /// The file or camera.
-        what: String,
-        /// What there is.
-        found: String,
-        /// What should be.
-        expected: String,
-    },
-    /// A role that must be filled once.
-    #[error("session has {found} files of role {role}{names}, expected {expected}")]
-    Count {
-        /// The role.
-        role: &'static str,
-        /// How many files.
-        found: usize,
-        /// Which, in brackets.
-        names: String,
-        /// How many there should be.
-        expected: &'static str,
     },
     /// Files and cameras don't go together, or silhouettes are damaged.
     #[error(transparent)]
@@ -68,20 +43,6 @@ pub enum InputError {
     Hull(#[from] vision::Error),
 }
 
-impl InputError {
-    pub(crate) fn in_file(file: &str) -> impl Fn(formats::Error) -> Self {
-        move |source| Self::File { file: file.to_owned(), source }
-    }
-
-    pub(crate) fn unexpected(
-        what: impl Into<String>,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-    ) -> Self {
-        Self::Unexpected { what: what.into(), found: found.into(), expected: expected.into() }
-    }
-}
-
 impl From<InputError> for JobError {
     fn from(error: InputError) -> Self {
         Self::give_up(error.to_string(), format!("{error:?}"))
@@ -95,21 +56,21 @@ pub(crate) enum CallError {
     Request(#[from] proto::Error),
     #[error(transparent)]
     Input(#[from] InputError),
-    #[error("body model {0} does not exist or is not ready")]
-    NoSuchModel(String),
-    #[error("the body model can't be loaded")]
-    Model(#[source] JobError),
-    #[error("database: {0}")]
-    Catalogue(#[from] sqlx::Error),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+impl From<FileError> for CallError {
+    fn from(error: FileError) -> Self {
+        Self::Input(error.into())
+    }
 }
 
 impl From<CallError> for tonic::Status {
     fn from(error: CallError) -> Self {
         let code = match &error {
             CallError::Request(_) | CallError::Input(_) => ErrorCode::InvalidInput,
-            CallError::NoSuchModel(_) => ErrorCode::NotFound,
-            CallError::Model(JobError::GiveUp { .. }) => ErrorCode::NotReady,
-            CallError::Model(_) | CallError::Catalogue(_) => ErrorCode::Unavailable,
+            CallError::Model(error) => error.code(),
         };
         if matches!(code, ErrorCode::Unavailable | ErrorCode::NotReady) {
             tracing::error!(error = ?error, "call failed");

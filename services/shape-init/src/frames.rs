@@ -7,6 +7,7 @@ use std::{
 
 use formats::{archive::Entry, image_files};
 use model::Image;
+use service::FileError;
 use video::{FrameReader, ReadOptions};
 
 use crate::InputError;
@@ -52,9 +53,9 @@ impl Frames {
             }
             Self::Pictures { entries, name } => {
                 let first =
-                    entries.first().ok_or_else(|| InputError::unexpected(name, "no pictures", "some"))?;
+                    entries.first().ok_or_else(|| FileError::unexpected(name, "no pictures", "some"))?;
                 let size = image_files::size(&first.bytes, &image_files::Limits::default());
-                let size = size.map_err(InputError::in_file(&format!("{name}: {}", first.name)))?;
+                let size = size.map_err(FileError::in_file(&format!("{name}: {}", first.name)))?;
                 Ok(Announced { size, count: Some(entries.len()), rate: None })
             }
         }
@@ -106,7 +107,7 @@ impl Stream<'_> {
             Self::Pictures { entries, name } => {
                 let Some(entry) = entries.next() else { return Ok(false) };
                 let read = image_files::read_image(&entry.bytes, &image_files::Limits::default());
-                *frame = read.map_err(InputError::in_file(&format!("{name}: {}", entry.name)))?;
+                *frame = read.map_err(FileError::in_file(&format!("{name}: {}", entry.name)))?;
                 Ok(true)
             }
         }

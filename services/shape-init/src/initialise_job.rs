@@ -3,10 +3,10 @@
 use std::{sync::Arc, time::Instant};
 
 use body::BodyModel;
+use camera_jobs::{CameraClips, Silhouettes, named, reports};
 use formats::image_files;
 use model::Image;
-use multi_view::SilhouetteClip;
-use payloads::JobReport;
+use payloads::{CameraReport, MultiViewReport, file_part, picture_name};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use shape_fit::Fit;
@@ -15,13 +15,15 @@ use crate::{
     INITIALISE_BODY, InputError, Shared,
     fit::{self, Moment},
     hull::hull,
-    payload::{CameraReport, InitialiseBody, file_part, picture_name, report_name},
+    payload::InitialiseBody,
     results::{self, ResultFile},
-    run_report::{RUN, RunReport, shape_report},
+    shape_report::shape_report,
 };
 
-/// Largest artefact of silhouettes, bytes.
-const MAX_CLIP_BYTES: u64 = 256 << 20;
+/// Name of the result with everything that decided the others.
+const RUN: &str = "run.json";
+/// Largest picture, bytes.
+const MAX_PICTURE_BYTES: u64 = 256 << 20;
 /// Colour of the outline of the body that was found.
 const OUTLINE: [u8; 3] = [0, 255, 120];
 /// Below this a user had better look.
@@ -46,15 +48,12 @@ impl Handler for InitialiseHandler {
 
     async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
         let started = Instant::now();
-        let Shared { store, pool, models, worker_name, .. } = &*self.shared;
-        objects::clean_up_earlier_attempts(store, &job).await;
+        let Shared { resources, models } = &*self.shared;
+        objects::clean_up_earlier_attempts(&resources.store, &job).await;
         let InitialiseBody { request, mut warnings, plan } = job.payload()?;
         job.progress(0.0, "reading the silhouettes");
-        let mut connection = pool.acquire().await?;
-        let artefacts = queue::dependency_artefacts(&mut connection, job.id()).await?;
-        drop(connection);
-        let artefacts: Vec<Artefact> = artefacts.into_iter().map(|a| a.artefact).collect();
-        let cameras = self.reports(&artefacts).await?;
+        let artefacts = resources.artefacts_before(&job).await?;
+        let cameras = reports(resources, &artefacts).await?;
         warnings.extend(cameras.iter().flat_map(|camera| camera.warnings.iter().cloned()));
         let moments = Arc::new(self.moments(&request.parameters, &cameras, &artefacts, &mut warnings).await?);
         let model = models.get(&request.body_model).await?;
@@ -92,13 +91,9 @@ impl Handler for InitialiseHandler {
                 artefacts_of_results.push(self.write(&job, file).await?);
             }
         }
-        let report = JobReport {
-            worker: worker_name.clone(),
-            attempt: job.attempt(),
-            seconds: started.elapsed().as_secs_f64(),
-            frames: moments.len(),
-        };
-        let report = RunReport::new(job.run_id().0, &request, &plan, &cameras, &warnings, &report);
+        let report = resources.job_report(&job, started, moments.len());
+        let report =
+            MultiViewReport::new(job.run_id().0, &request, (&plan, &report), &cameras, &warnings, None);
         let content = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
         let run = ResultFile { name: RUN.to_owned(), media_type: "application/json", content };
         artefacts_of_results.push(self.write(&job, run).await?);
@@ -107,17 +102,6 @@ impl Handler for InitialiseHandler {
 }
 
 impl InitialiseHandler {
-    /// What was found of every camera, in their order.
-    async fn reports(&self, artefacts: &[Artefact]) -> Result<Vec<CameraReport>, JobError> {
-        let mut reports = Vec::new();
-        for index in 0.. {
-            let Some(artefact) = named(artefacts, &report_name(index)) else { break };
-            let bytes = self.read(artefact).await?;
-            reports.push(serde_json::from_slice(&bytes).map_err(JobError::retry)?);
-        }
-        Ok(reports)
-    }
-
     /// The silhouettes of all cameras at the frames from which the shape is found.
     async fn moments(
         &self,
@@ -136,20 +120,13 @@ impl InitialiseHandler {
                  the same moment"
             ));
         }
+        let clips: Result<Vec<_>, _> =
+            cameras.iter().map(|camera| CameraClips::new(camera, artefacts)).collect();
+        let clips = clips?;
         let mut moments = Vec::new();
         for frame in parameters.frames_of_shape(first_end.unwrap_or(0)) {
-            let mut views = Vec::new();
-            for camera in cameras {
-                let own = camera.camera.camera().map_err(JobError::retry)?;
-                let holds = |c: &&crate::payload::ClipPlace| {
-                    (c.first_frame..c.first_frame + c.num_frames).contains(&frame)
-                };
-                let clip = camera.clips.iter().find(holds).and_then(|clip| named(artefacts, &clip.name));
-                let clip = clip.ok_or_else(|| JobError::retry(format!("no silhouette of frame {frame}")))?;
-                let clip = SilhouetteClip::from_bytes(&self.read(clip).await?).map_err(JobError::retry)?;
-                views.push((own, clip.get(frame).map_err(JobError::retry)?));
-            }
-            moments.push(Moment { frame, views });
+            let silhouettes = Silhouettes::read(&self.shared.resources, &clips, frame..frame + 1).await?;
+            moments.push(Moment { frame, views: silhouettes.views(frame).map_err(JobError::retry)? });
         }
         Ok(moments)
     }
@@ -186,7 +163,7 @@ impl InitialiseHandler {
     ) -> Result<Option<ResultFile>, JobError> {
         let Some(frame) = moments.first().map(|moment| moment.frame) else { return Ok(None) };
         let Some(artefact) = named(artefacts, &picture_name(camera.index, frame)) else { return Ok(None) };
-        let bytes = self.read(artefact).await?;
+        let bytes = self.shared.resources.read_artefact(artefact, MAX_PICTURE_BYTES).await?;
         let own = camera.camera.camera().map_err(JobError::retry)?;
         let name = format!("overlay_{}.png", file_part(&camera.camera.name, camera.index));
         let fits = fits.clone();
@@ -201,19 +178,10 @@ impl InitialiseHandler {
         Ok(Some(drawn.await?))
     }
 
-    async fn read(&self, artefact: &Artefact) -> Result<bytes::Bytes, JobError> {
-        let input =
-            objects::Input { name: &artefact.name, store_key: &artefact.store_key, blake3: &artefact.blake3 };
-        objects::read(&self.shared.store, input, MAX_CLIP_BYTES).await
-    }
-
     async fn write(&self, job: &JobContext, file: ResultFile) -> Result<Artefact, JobError> {
-        objects::write_result(&self.shared.store, job, &file.name, file.media_type, file.content).await
+        objects::write_result(&self.shared.resources.store, job, &file.name, file.media_type, file.content)
+            .await
     }
-}
-
-fn named<'a>(artefacts: &'a [Artefact], name: &str) -> Option<&'a Artefact> {
-    artefacts.iter().find(|artefact| artefact.name == name)
 }
 
 /// Why no body was found, with what is known of the cameras: poor silhouettes are the usual reason.

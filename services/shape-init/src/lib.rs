@@ -17,26 +17,24 @@ mod frames;
 mod hull;
 mod initialise_job;
 mod members;
-mod models;
 mod payload;
 mod plan_job;
 mod results;
 mod rpc;
-mod run_report;
 mod sampling;
 mod scratch;
 mod segment;
+mod shape_report;
 mod silhouettes_job;
 mod sources;
 
 pub use error::InputError;
 
-use models::Models;
+use camera_jobs::Models;
 use proto::v1::shape_init_server::ShapeInitServer;
-use service::{Config, Parts, Running};
+use service::{Config, Parts, Resources, Running};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use store::Store;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 
@@ -53,12 +51,8 @@ pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCA
 
 /// What all handlers of one process share.
 struct Shared {
-    store: Store,
-    pool: sqlx::PgPool,
+    resources: Resources,
     models: Models,
-    memory: service::config::MemoryConfig,
-    /// How this process shows in `run.json`.
-    worker_name: String,
 }
 
 /// Starts the service; it runs until `shutdown`. [`Running::address`] says where it listens.
@@ -67,15 +61,9 @@ struct Shared {
 /// If the address, the store or the database's URL can't be used. A database that does not answer yet is
 /// waited for.
 pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Running, service::Error> {
-    let pool = service::database::pool(&config.database)?;
-    let store = Store::open(&config.store)?;
-    let shared = Arc::new(Shared {
-        models: Models::new(store.clone(), pool.clone()),
-        pool: pool.clone(),
-        store,
-        memory: config.memory.clone(),
-        worker_name: config.worker.name(NAME),
-    });
+    let resources = Resources::open(&config, NAME)?;
+    let pool = resources.pool.clone();
+    let shared = Arc::new(Shared { models: Models::new(resources.clone()), resources });
     let rpc =
         ShapeInitServer::new(rpc::Rpc::new(shared.clone())).max_decoding_message_size(rpc::MAX_REQUEST_BYTES);
     let builder = config.worker.builder(NAME, &pool).map(|builder| {

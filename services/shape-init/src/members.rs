@@ -5,7 +5,8 @@ use std::{cmp::Ordering, collections::BTreeSet};
 use bytes::Bytes;
 use formats::archive::{self, Entry, Limits};
 
-use crate::{InputError, payload::Members};
+use payloads::Members;
+use service::FileError;
 
 /// Whether a member is a picture; what systems hide in archives isn't.
 pub(crate) fn is_picture(name: &str) -> bool {
@@ -23,7 +24,7 @@ fn limits(max_bytes: u64) -> Limits {
 ///
 /// # Errors
 /// If the archive is damaged.
-pub(crate) fn pictures(name: &str, bytes: &Bytes, max_bytes: u64) -> Result<Vec<String>, InputError> {
+pub(crate) fn pictures(name: &str, bytes: &Bytes, max_bytes: u64) -> Result<Vec<String>, FileError> {
     let mut names = Vec::new();
     archive::entries_where(name, bytes, &limits(max_bytes), |member| {
         if is_picture(member) {
@@ -31,7 +32,7 @@ pub(crate) fn pictures(name: &str, bytes: &Bytes, max_bytes: u64) -> Result<Vec<
         }
         false
     })
-    .map_err(InputError::in_file(name))?;
+    .map_err(FileError::in_file(name))?;
     names.sort_by(|a, b| natural(a, b));
     Ok(names)
 }
@@ -45,26 +46,24 @@ pub(crate) fn read(
     bytes: &Bytes,
     members: &Members,
     max_bytes: u64,
-) -> Result<Vec<Entry>, InputError> {
-    let is_wanted = |member: &str| is_picture(member) && members.has(member);
+) -> Result<Vec<Entry>, FileError> {
+    let is_wanted = |member: &str| is_picture(member) && has(members, member);
     let mut entries = archive::entries_where(name, bytes, &limits(max_bytes), is_wanted)
-        .map_err(InputError::in_file(name))?;
+        .map_err(FileError::in_file(name))?;
     if entries.is_empty() {
-        return Err(InputError::unexpected(name, "no pictures", "PNG or JPEG files, one a frame"));
+        return Err(FileError::unexpected(name, "no pictures", "PNG or JPEG files, one a frame"));
     }
     entries.sort_by(|a, b| natural(&a.name, &b.name));
     Ok(entries)
 }
 
-impl Members {
-    /// Whether a member is one of them.
-    pub fn has(&self, member: &str) -> bool {
-        let (folder, file) = member.rsplit_once('/').unwrap_or(("", member));
-        match self {
-            Self::Folder(own) => folder == own,
-            Self::Prefix { folder: own, prefix } => folder == own && beginning(file) == prefix,
-            Self::One(name) => member == name,
-        }
+/// Whether a member is one of them.
+fn has(members: &Members, member: &str) -> bool {
+    let (folder, file) = member.rsplit_once('/').unwrap_or(("", member));
+    match members {
+        Members::Folder(own) => folder == own,
+        Members::Prefix { folder: own, prefix } => folder == own && beginning(file) == prefix,
+        Members::One(name) => member == name,
     }
 }
 

@@ -1,53 +1,8 @@
-//! What the jobs of one run give each other. Everything that decides the result is in here.
+//! What the jobs of one run give each other within this service. Everything that decides the result is in here.
 
-use background::CameraQuality;
 use multi_view::CameraRecord;
-use payloads::{InputFile, JobReport, PlanMultiView};
+use payloads::{JobReport, PlanMultiView, Source};
 use serde::{Deserialize, Serialize};
-
-/// Where the pictures of a camera are.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Source {
-    /// what messages call it: the file, or `ARCHIVE/FOLDER`
-    pub name: String,
-    /// how it is read
-    pub kind: SourceKind,
-    /// the upload
-    pub file: InputFile,
-    /// which members of it, if it is an archive
-    pub members: Option<Members>,
-}
-
-/// How pictures are read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum SourceKind {
-    /// frames of a video
-    Video,
-    /// a PNG or JPEG a frame
-    Images,
-    /// a silhouette a frame
-    Masks,
-    /// one picture of the empty scene
-    Plate,
-}
-
-/// Members of an archive.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum Members {
-    /// the pictures of a folder, empty at the top
-    Folder(String),
-    /// those of a folder whose names begin so, before the number
-    Prefix {
-        /// empty at the top
-        folder: String,
-        /// up to the number
-        prefix: String,
-    },
-    /// one, by its whole name
-    One(String),
-}
 
 /// Payload of [`crate::MAKE_SILHOUETTES`], made by the plan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -73,63 +28,4 @@ pub(crate) struct InitialiseBody {
     pub warnings: Vec<String>,
     /// what the plan itself took
     pub plan: JobReport,
-}
-
-/// What one job of silhouettes leaves beside the clips.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct CameraReport {
-    /// index of the camera among those of the run
-    pub index: usize,
-    /// as it fits the pictures that were read
-    pub camera: CameraRecord,
-    /// where the pictures were
-    pub source: String,
-    /// the empty scene, if there was a picture of it
-    pub plate: Option<String>,
-    /// frame after the last
-    pub end_frame: usize,
-    /// frames a second, if the file tells
-    pub frame_rate: Option<f64>,
-    /// how far to trust the silhouettes; none for masks
-    pub quality: Option<CameraQuality>,
-    /// what was assumed, and what to do better
-    pub warnings: Vec<String>,
-    /// the clips in their order
-    pub clips: Vec<ClipPlace>,
-    /// what it took
-    pub job: JobReport,
-}
-
-/// One clip of silhouettes.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct ClipPlace {
-    /// name of the artefact
-    pub name: String,
-    /// first frame in it
-    pub first_frame: usize,
-    /// frames in it
-    pub num_frames: usize,
-}
-
-/// Name of the artefact with the report of a camera.
-pub(crate) fn report_name(index: usize) -> String {
-    format!("camera-{index:03}.json")
-}
-
-/// Name of the artefact with a clip of a camera.
-pub(crate) fn clip_name(index: usize, first_frame: usize) -> String {
-    format!("clip-{index:03}-{first_frame:08}.sil")
-}
-
-/// Name of the artefact with the picture of a frame of a camera.
-pub(crate) fn picture_name(index: usize, frame: usize) -> String {
-    format!("picture-{index:03}-{frame:08}.png")
-}
-
-/// A camera's name as a part of a file's.
-pub(crate) fn file_part(camera: &str, index: usize) -> String {
-    let kept: String =
-        camera.chars().take(60).map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-    // names that differ in other signs must not collide
-    if kept == camera { kept } else { format!("{kept}_{index}") }
 }

@@ -6,13 +6,13 @@ use bytes::Bytes;
 use formats::{calibration, image_files};
 use model::Camera;
 use multi_view::CameraRecord;
-use payloads::{InputFile, JobReport, PLAN_MULTI_VIEW, PlanMultiView};
+use payloads::{InputFile, JobReport, PLAN_MULTI_VIEW, PlanMultiView, Source, SourceKind};
 use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
-use service::{compute, objects};
+use service::{FileError, compute};
 
 use crate::{
     INITIALISE_BODY, InputError, MAKE_SILHOUETTES, Shared, members,
-    payload::{InitialiseBody, MakeSilhouettes, Source, SourceKind},
+    payload::{InitialiseBody, MakeSilhouettes},
     sources::{self, CameraSources},
 };
 
@@ -47,17 +47,12 @@ impl Handler for PlanHandler {
         self.shared.models.get(&request.body_model).await?;
         let (sources, picture_size) = self.sources(&job, &request).await?;
         let file = calibration_file(&request.files)?;
-        let bytes = self.read(file, MAX_CALIBRATION_BYTES).await?;
+        let bytes = self.shared.resources.read_file(file, MAX_CALIBRATION_BYTES).await?;
         let (mut warnings, cameras) = read_calibration(&request, file, &bytes, picture_size)?;
         let names: Vec<String> = cameras.iter().map(|camera| camera.name.clone()).collect();
         let matched =
             sources::match_cameras(sources, &names, &request.cameras, &request.camera_files, &mut warnings)?;
-        let plan = JobReport {
-            worker: self.shared.worker_name.clone(),
-            attempt: job.attempt(),
-            seconds: started.elapsed().as_secs_f64(),
-            frames: 0,
-        };
+        let plan = self.shared.resources.job_report(&job, started, 0);
         Ok(Outcome::default().children(children(request, &cameras, matched, warnings, plan)?))
     }
 }
@@ -69,7 +64,8 @@ impl PlanHandler {
         job: &JobContext,
         request: &PlanMultiView,
     ) -> Result<(Vec<Source>, Option<[u32; 2]>), JobError> {
-        let most = self.shared.memory.max_build_bytes;
+        let resources = &self.shared.resources;
+        let most = resources.memory.max_build_bytes;
         let (mut found, mut size) = (Vec::new(), None);
         for file in &request.files {
             job.check()?;
@@ -78,7 +74,7 @@ impl PlanHandler {
                 continue;
             }
             job.progress(0.2, format!("looking into {}", file.name));
-            let bytes = self.read(file, self.shared.memory.max_object_bytes).await?;
+            let bytes = resources.read_file(file, resources.memory.max_object_bytes).await?;
             let (of, needs_size) = (file.clone(), size.is_none());
             let (sources, first) = compute::run(move || -> Result<_, InputError> {
                 let sources = sources::of_archive(&of, &bytes, most)?;
@@ -90,11 +86,6 @@ impl PlanHandler {
             size = size.or(first);
         }
         Ok((found, size))
-    }
-
-    async fn read(&self, file: &InputFile, max_bytes: u64) -> Result<Bytes, JobError> {
-        let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
-        objects::read(&self.shared.store, input, max_bytes).await
     }
 }
 
@@ -118,7 +109,7 @@ fn calibration_file(files: &[InputFile]) -> Result<&InputFile, InputError> {
         _ => {
             let names: Vec<&str> = found.iter().map(|file| file.name.as_str()).collect();
             let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
-            Err(InputError::Count { role: "calibration", found: found.len(), names, expected: "one" })
+            Err(FileError::Count { role: "calibration", found: found.len(), names, expected: "one" }.into())
         }
     }
 }
@@ -132,9 +123,9 @@ fn read_calibration(
 ) -> Result<(Vec<String>, Vec<Camera>), InputError> {
     let up = request.up.as_ref().map(|up| up.parse()).transpose();
     let up =
-        up.map_err(|_| InputError::unexpected("up", format!("{:?}", request.up), "x, y, z, -x, -y or -z"))?;
+        up.map_err(|_| FileError::unexpected("up", format!("{:?}", request.up), "x, y, z, -x, -y or -z"))?;
     let options = calibration::Options { up, metres_per_unit: request.metres_per_unit, image_size };
-    let read = calibration::read(&file.name, bytes, &options).map_err(InputError::in_file(&file.name))?;
+    let read = calibration::read(&file.name, bytes, &options).map_err(FileError::in_file(&file.name))?;
     let warnings = read.warnings.into_iter().map(|w| format!("{}: {}", file.name, w.message)).collect();
     Ok((warnings, read.value))
 }

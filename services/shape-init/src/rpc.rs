@@ -2,12 +2,9 @@
 
 use std::sync::Arc;
 
-use formats::{calibration, calibration::fit_to_image, image_files};
-use model::{Camera, Silhouette};
-use payloads::BodyModelFile;
+use camera_jobs::views;
 use proto::v1::{self, MeshFormat, shape_init_server::ShapeInit};
-use service::compute;
-use tokio::sync::Semaphore;
+use service::{FileError, compute::Slots};
 use tonic::{Request, Response, Status};
 
 use crate::{
@@ -25,27 +22,18 @@ const CELL_M: f64 = 0.01;
 
 pub(crate) struct Rpc {
     shared: Arc<Shared>,
-    /// Calls that compute at once: one a core, the rest wait.
-    slots: Semaphore,
+    slots: Slots,
 }
 
 impl Rpc {
     pub fn new(shared: Arc<Shared>) -> Self {
-        let slots = std::thread::available_parallelism().map_or(1, usize::from);
-        Self { shared, slots: Semaphore::new(slots) }
-    }
-
-    async fn model(&self, which: &str) -> Result<(BodyModelFile, Arc<body::BodyModel>), CallError> {
-        let file = self.shared.models.find(which).await?;
-        let model = self.shared.models.get(&file).await.map_err(CallError::Model)?;
-        Ok((file, model))
+        Self { shared, slots: Slots::default() }
     }
 
     async fn sample(&self, request: v1::SampleBodyRequest) -> Result<v1::SampleBodyResponse, CallError> {
-        let (_, model) = self.model(&request.body_model_id).await?;
-        // A failure to get a slot would mean that the semaphore was closed, which nobody does.
-        let _slot = self.slots.acquire().await;
-        compute::run(move || {
+        let (_, model) =
+            self.shared.models.of_request(&request.body_model_id).await.map_err(CallError::from)?;
+        let sampled = self.slots.run(move || {
             let shape = sample(&model, &request)?;
             let mesh = match request.format() {
                 MeshFormat::Glb => body_files::glb(&model, &shape, None).map_err(InputError::from)?,
@@ -62,8 +50,8 @@ impl Rpc {
                 hip_m: m.hip_m,
             };
             Ok(v1::SampleBodyResponse { mesh, alpha: shape.alpha, measurements: Some(measurements) })
-        })
-        .await
+        });
+        sampled.await
     }
 
     async fn preview(&self, request: v1::PreviewHullRequest) -> Result<v1::PreviewHullResponse, CallError> {
@@ -75,46 +63,19 @@ impl Rpc {
             let found = request.silhouettes.len().to_string();
             return Err(out_of_range("silhouettes", &found, "2 to 64").into());
         }
-        let _slot = self.slots.acquire().await;
-        compute::run(move || -> Result<_, CallError> {
-            let (views, warnings) = views(&request)?;
-            let found = hull(&views, cell_m)?;
+        let carved = self.slots.run(move || -> Result<_, CallError> {
+            let seen = views(&request.calibration_name, &request.calibration, &request.silhouettes)?;
+            let found = hull(&seen.views, cell_m)?;
             let mesh = match request.format() {
                 MeshFormat::Glb => {
-                    formats::glb::write_mesh("hull", &found.mesh).map_err(InputError::in_file("hull"))?
+                    formats::glb::write_mesh("hull", &found.mesh).map_err(FileError::in_file("hull"))?
                 }
                 MeshFormat::Ply => formats::ply::write(&found.mesh),
             };
-            Ok(v1::PreviewHullResponse { mesh, pieces_m3: found.pieces_m3, warnings })
-        })
-        .await
+            Ok(v1::PreviewHullResponse { mesh, pieces_m3: found.pieces_m3, warnings: seen.warnings })
+        });
+        carved.await
     }
-}
-
-type Views = Vec<(Camera, Silhouette)>;
-
-/// Cameras and silhouettes of a request, and what was assumed of them.
-fn views(request: &v1::PreviewHullRequest) -> Result<(Views, Vec<String>), InputError> {
-    let name = &request.calibration_name;
-    let read = calibration::read(name, &request.calibration, &calibration::Options::default())
-        .map_err(InputError::in_file(name))?;
-    let mut warnings: Vec<String> = read.warnings.into_iter().map(|w| w.message).collect();
-    let mut views = Vec::new();
-    for given in &request.silhouettes {
-        let camera = read.value.iter().find(|camera| camera.name == given.camera).ok_or_else(|| {
-            let names: Vec<&str> = read.value.iter().map(|camera| camera.name.as_str()).collect();
-            InputError::unexpected("silhouettes", format!("camera {:?}", given.camera), names.join(", "))
-        })?;
-        let in_file = InputError::in_file(&given.camera);
-        let mask =
-            image_files::read_silhouette(&given.image, &image_files::Limits::default()).map_err(&in_file)?;
-        // sides were limited just now
-        let size = [mask.value.width() as u32, mask.value.height() as u32];
-        let fitted = fit_to_image(camera, size).map_err(&in_file)?;
-        warnings.extend(mask.warnings.into_iter().chain(fitted.warnings).map(|w| w.message));
-        views.push((fitted.value, mask.value));
-    }
-    Ok((views, warnings))
 }
 
 #[tonic::async_trait]
@@ -123,7 +84,8 @@ impl ShapeInit for Rpc {
         &self,
         request: Request<v1::DescribeBodyModelRequest>,
     ) -> Result<Response<v1::DescribeBodyModelResponse>, Status> {
-        let (file, model) = self.model(&request.into_inner().body_model_id).await?;
+        let which = request.into_inner().body_model_id;
+        let (file, model) = self.shared.models.of_request(&which).await.map_err(CallError::from)?;
         let rig = model.rig();
         let parent = |parent: Option<usize>| parent.map_or(-1, |p| i32::try_from(p).unwrap_or(i32::MAX));
         let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);

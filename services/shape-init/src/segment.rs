@@ -6,6 +6,7 @@ use background::{CameraQuality, Segmenter};
 use formats::{archive::Entry, image_files};
 use model::{Image, Silhouette};
 use multi_view::{ClipWriter, Parameters};
+use service::FileError;
 
 use crate::{
     InputError,
@@ -93,11 +94,12 @@ impl<'a, S: Sink> Packer<'a, S> {
     /// Ends the last clip; refuses to end before the first frame.
     fn finish(mut self, name: &str) -> Result<usize, InputError> {
         if self.frame == self.parameters.first_frame {
-            return Err(InputError::unexpected(
+            return Err(FileError::unexpected(
                 name,
                 "fewer frames than that",
                 format!("at least first_frame + 1 = {}", self.parameters.first_frame + 1),
-            ));
+            )
+            .into());
         }
         self.close();
         Ok(self.frame)
@@ -122,16 +124,17 @@ pub(crate) fn of_masks(
         }
         let place = format!("{name}: {}", entry.name);
         let read = image_files::read_silhouette(&entry.bytes, &image_files::Limits::default())
-            .map_err(InputError::in_file(&place))?;
+            .map_err(FileError::in_file(&place))?;
         let mask = read.value;
         let found = [mask.width(), mask.height()];
         let first = *size.get_or_insert(found);
         if found != first {
-            return Err(InputError::unexpected(
+            return Err(FileError::unexpected(
                 place,
                 format!("{} x {} pixels", found[0], found[1]),
                 format!("{} x {} as the first", first[0], first[1]),
-            ));
+            )
+            .into());
         }
         empty += usize::from(mask.area() == 0);
         // one warning of a kind says enough

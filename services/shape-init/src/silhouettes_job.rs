@@ -11,9 +11,11 @@ use std::{
 use formats::{calibration::fit_to_image, image_files};
 use model::Image;
 use multi_view::CameraRecord;
-use payloads::{InputFile, JobReport};
+use payloads::{
+    CameraReport, ClipPlace, Source, SourceKind, clip_name, file_part, picture_name, report_name,
+};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
-use service::{compute, objects};
+use service::{FileError, compute, objects};
 use tempfile::TempDir;
 use tokio::sync::mpsc;
 
@@ -21,10 +23,7 @@ use crate::{
     InputError, MAKE_SILHOUETTES, Shared,
     frames::Frames,
     members,
-    payload::{
-        CameraReport, ClipPlace, MakeSilhouettes, Source, SourceKind, clip_name, file_part, picture_name,
-        report_name,
-    },
+    payload::MakeSilhouettes,
     scratch,
     segment::{self, Made, Piece, Sink},
 };
@@ -51,7 +50,8 @@ impl Handler for SilhouettesHandler {
 
     async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
         let started = Instant::now();
-        let Shared { store, worker_name, .. } = &*self.shared;
+        let resources = &self.shared.resources;
+        let store = &resources.store;
         objects::clean_up_earlier_attempts(store, &job).await;
         let payload: MakeSilhouettes = job.payload()?;
         let index = payload.index;
@@ -65,19 +65,14 @@ impl Handler for SilhouettesHandler {
         let report = CameraReport {
             index,
             camera,
-            source: payload.source.name.clone(),
+            source: payload.source.clone(),
             plate: payload.plate.as_ref().map(|plate| plate.name.clone()),
             end_frame: made.made.end_frame,
             frame_rate: made.frame_rate,
             quality: made.made.quality,
             warnings: made.made.warnings,
             clips: written.clips,
-            job: JobReport {
-                worker: worker_name.clone(),
-                attempt: job.attempt(),
-                seconds: started.elapsed().as_secs_f64(),
-                frames: made.made.end_frame - payload.parameters.first_frame,
-            },
+            job: resources.job_report(&job, started, made.made.end_frame - payload.parameters.first_frame),
         };
         let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
         let report = objects::write(store, &job, &report_name(index), "application/json", report).await?;
@@ -109,7 +104,7 @@ impl SilhouettesHandler {
         let name = source.name.clone();
         match source.kind {
             SourceKind::Video => {
-                let path = scratch::copy(&self.shared.store, &source.file, scratch.path()).await?;
+                let path = scratch::copy(&self.shared.resources.store, &source.file, scratch.path()).await?;
                 let largest_side = payload.parameters.largest_side;
                 Ok(Opened::Frames(Frames::Video { path, name, largest_side }))
             }
@@ -122,19 +117,15 @@ impl SilhouettesHandler {
     }
 
     async fn entries(&self, source: &Source) -> Result<Vec<formats::archive::Entry>, JobError> {
-        let bytes = self.read(&source.file).await?;
+        let resources = &self.shared.resources;
+        let bytes = resources.read_file(&source.file, resources.memory.max_object_bytes).await?;
         let (name, members) = (source.file.name.clone(), source.members.clone());
-        let most = self.shared.memory.max_build_bytes;
+        let most = resources.memory.max_build_bytes;
         let read = compute::run(move || match &members {
             Some(members) => members::read(&name, &bytes, members, most),
             None => Ok(vec![formats::archive::Entry { name, bytes: bytes.to_vec() }]),
         });
-        Ok(read.await?)
-    }
-
-    async fn read(&self, file: &InputFile) -> Result<bytes::Bytes, JobError> {
-        let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
-        objects::read(&self.shared.store, input, self.shared.memory.max_object_bytes).await
+        Ok(read.await.map_err(InputError::from)?)
     }
 
     async fn plate(&self, source: Option<&Source>) -> Result<Option<Image>, JobError> {
@@ -143,11 +134,11 @@ impl SilhouettesHandler {
         let name = source.name.clone();
         let read = compute::run(move || {
             let entry =
-                entries.first().ok_or_else(|| InputError::unexpected(&name, "nothing", "a picture"))?;
+                entries.first().ok_or_else(|| FileError::unexpected(&name, "nothing", "a picture"))?;
             image_files::read_image(&entry.bytes, &image_files::Limits::default())
-                .map_err(InputError::in_file(&name))
+                .map_err(FileError::in_file(&name))
         });
-        Ok(Some(read.await?))
+        Ok(Some(read.await.map_err(InputError::from)?))
     }
 
     /// Makes silhouettes on a thread of their own and writes them as they come.
@@ -185,7 +176,7 @@ impl SilhouettesHandler {
         piece: Piece,
         written: &mut Written,
     ) -> Result<(), JobError> {
-        let store = &self.shared.store;
+        let store = &self.shared.resources.store;
         match piece {
             Piece::Clip { first_frame, num_frames, bytes } => {
                 let name = clip_name(payload.index, first_frame);
@@ -226,7 +217,7 @@ fn make(
     let calibrated = payload
         .camera
         .camera()
-        .map_err(|e| InputError::unexpected(&payload.camera.name, e.to_string(), "a camera"))?;
+        .map_err(|e| FileError::unexpected(&payload.camera.name, e.to_string(), "a camera"))?;
     let (size, frame_rate) = match opened {
         Opened::Masks(entries) => {
             let frames =
@@ -234,7 +225,7 @@ fn make(
             let first = entries.first().map_or("", |entry| entry.name.as_str());
             let size = frames
                 .transpose()
-                .map_err(InputError::in_file(&format!("{}: {first}", payload.source.name)))?;
+                .map_err(FileError::in_file(&format!("{}: {first}", payload.source.name)))?;
             (size.unwrap_or_default(), None)
         }
         Opened::Frames(frames) => {
@@ -242,7 +233,7 @@ fn make(
             (announced.size, announced.rate)
         }
     };
-    let fitted = fit_to_image(&calibrated, size).map_err(InputError::in_file(&payload.source.name))?;
+    let fitted = fit_to_image(&calibrated, size).map_err(FileError::in_file(&payload.source.name))?;
     let name = &payload.source.name;
     let cancelled = sink.cancelled.clone();
     let made = match opened {

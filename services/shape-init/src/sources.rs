@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use bytes::Bytes;
 use multi_view::assign;
-use payloads::InputFile;
+use payloads::{InputFile, Members, Source, SourceKind};
+use service::FileError;
 
 use crate::{
     InputError,
     members::{groups, is_picture, pictures},
-    payload::{Members, Source, SourceKind},
 };
 
 /// Pictures and plate of one camera.
@@ -45,7 +45,7 @@ pub(crate) fn of_archive(file: &InputFile, bytes: &Bytes, max_bytes: u64) -> Res
     let Some(kind) = kind_of(&file.role) else { return Ok(Vec::new()) };
     let names = pictures(&file.name, bytes, max_bytes)?;
     if names.is_empty() {
-        return Err(InputError::unexpected(&file.name, "no PNG or JPEG in it", "pictures, one a frame"));
+        return Err(FileError::unexpected(&file.name, "no PNG or JPEG in it", "pictures, one a frame").into());
     }
     let source = |inside: &str, members: Members| {
         let name = if inside.is_empty() { file.name.clone() } else { format!("{}/{inside}", file.name) };
@@ -84,7 +84,7 @@ pub(crate) fn match_cameras(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<CameraSources>, InputError> {
     if let Some(unknown) = asked.iter().find(|name| !cameras.contains(name)) {
-        return Err(InputError::unexpected("cameras", format!("{unknown:?}"), cameras.join(", ")));
+        return Err(FileError::unexpected("cameras", format!("{unknown:?}"), cameras.join(", ")).into());
     }
     let (plates, pictures): (Vec<Source>, Vec<Source>) =
         sources.into_iter().partition(|source| source.kind == SourceKind::Plate);
@@ -98,7 +98,9 @@ pub(crate) fn match_cameras(
     let (plate_names, plate_map) = known(&plates);
     if let Some(stray) = map.keys().find(|name| !own.contains_key(*name) && !plate_map.contains_key(*name)) {
         let all = names.iter().chain(&plate_names).cloned().collect::<Vec<_>>().join(", ");
-        return Err(InputError::unexpected("camera_files", format!("{stray:?}"), format!("one of {all}")));
+        return Err(
+            FileError::unexpected("camera_files", format!("{stray:?}"), format!("one of {all}")).into()
+        );
     }
     let assigned = assign(&names, cameras, &own)?;
     let mut found: Vec<CameraSources> = assigned
@@ -118,22 +120,24 @@ pub(crate) fn match_cameras(
     for (index, name) in cameras.iter().enumerate() {
         let is_missing = found.iter().all(|of| of.camera != index);
         if is_missing && asked.contains(name) {
-            return Err(InputError::unexpected(
+            return Err(FileError::unexpected(
                 format!("camera {name}"),
                 "no video, pictures or masks",
                 "a file named after it",
-            ));
+            )
+            .into());
         }
         if is_missing && asked.is_empty() {
             warnings.push(format!("camera {name} has no video, pictures or masks: it is not used"));
         }
     }
     if found.len() < 2 {
-        return Err(InputError::unexpected(
+        return Err(FileError::unexpected(
             "session",
             format!("pictures of {} of the calibrated cameras", found.len()),
             "at least 2",
-        ));
+        )
+        .into());
     }
     Ok(found)
 }

@@ -5,27 +5,26 @@ use std::sync::Arc;
 use body::BodyModel;
 use body_files::shipped;
 use payloads::{BodyModelFile, SHIPPED};
+use proto::ErrorCode;
 use queue::JobError;
-use service::{Cache, compute, objects};
-use sqlx::PgPool;
-use store::Store;
+use service::{Cache, Resources, compute, objects};
 use uuid::Uuid;
-
-use crate::error::CallError;
 
 /// What models take together in memory, bytes; one takes about six times its file.
 const CACHE_BYTES: u64 = 256 << 20;
 
-pub(crate) struct Models {
-    store: Store,
-    pool: PgPool,
+/// Body models of one process.
+#[derive(Debug)]
+pub struct Models {
+    resources: Resources,
     /// by the BLAKE3 of their files
     loaded: Cache<String, BodyModel>,
 }
 
 impl Models {
-    pub fn new(store: Store, pool: PgPool) -> Self {
-        Self { store, pool, loaded: Cache::new(CACHE_BYTES) }
+    /// None yet.
+    pub fn new(resources: Resources) -> Self {
+        Self { resources, loaded: Cache::new(CACHE_BYTES) }
     }
 
     /// The model of a file.
@@ -47,7 +46,7 @@ impl Models {
         let load = async {
             let name = format!("body model {}@{}", file.name, file.version);
             let input = objects::Input { name: &name, store_key, blake3: &file.blake3 };
-            let bytes = objects::read(&self.store, input, body::MAX_BYTES as u64).await?;
+            let bytes = objects::read(&self.resources.store, input, body::MAX_BYTES as u64).await?;
             let model = compute::run(move || BodyModel::from_bytes(&bytes)).await;
             let model = model.map_err(|e| JobError::give_up(format!("{name}: {e}"), format!("{e:?}")))?;
             let bytes =
@@ -57,8 +56,17 @@ impl Models {
         self.loaded.get_or_load(file.blake3.clone(), load).await
     }
 
-    /// The file of a model that is ready, by its id or `shipped`.
-    pub async fn find(&self, which: &str) -> Result<BodyModelFile, CallError> {
+    /// The model of a request, by its id or `shipped`, and its file.
+    ///
+    /// # Errors
+    /// If there is none, or it can't be read.
+    pub async fn of_request(&self, which: &str) -> Result<(BodyModelFile, Arc<BodyModel>), ModelError> {
+        let file = self.find(which).await?;
+        let model = self.get(&file).await.map_err(ModelError::Load)?;
+        Ok((file, model))
+    }
+
+    async fn find(&self, which: &str) -> Result<BodyModelFile, ModelError> {
         if which == SHIPPED {
             return Ok(shipped_file());
         }
@@ -66,9 +74,9 @@ impl Models {
         let sql = "SELECT id, name, version, store_key, blake3 FROM body_models
                    WHERE id = $1 AND store_key IS NOT NULL";
         let row: Option<(Uuid, String, i32, String, String)> =
-            sqlx::query_as(sql).bind(id).fetch_optional(&self.pool).await?;
+            sqlx::query_as(sql).bind(id).fetch_optional(&self.resources.pool).await?;
         let (id, name, version, store_key, blake3) =
-            row.ok_or_else(|| CallError::NoSuchModel(which.to_owned()))?;
+            row.ok_or_else(|| ModelError::NoSuchModel(which.to_owned()))?;
         Ok(BodyModelFile { id, name, version, store_key: Some(store_key), blake3 })
     }
 }
@@ -76,4 +84,34 @@ impl Models {
 fn shipped_file() -> BodyModelFile {
     let (id, name) = (Uuid::nil(), SHIPPED.to_owned());
     BodyModelFile { id, name, version: 1, store_key: None, blake3: shipped().blake3.clone() }
+}
+
+/// Why a request gets no body model.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// Not an id.
+    #[error(transparent)]
+    Request(#[from] proto::Error),
+    /// None of that id.
+    #[error("body model {0} does not exist or is not ready")]
+    NoSuchModel(String),
+    /// Its file.
+    #[error("the body model can't be loaded")]
+    Load(#[source] JobError),
+    /// PostgreSQL failed.
+    #[error("database: {0}")]
+    Catalogue(#[from] sqlx::Error),
+}
+
+impl ModelError {
+    /// What a caller is told.
+    pub fn code(&self) -> ErrorCode {
+        match self {
+            Self::Request(_) => ErrorCode::InvalidInput,
+            Self::NoSuchModel(_) => ErrorCode::NotFound,
+            Self::Load(JobError::GiveUp { .. }) => ErrorCode::NotReady,
+            Self::Load(_) | Self::Catalogue(_) => ErrorCode::Unavailable,
+        }
+    }
 }

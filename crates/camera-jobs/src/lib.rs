@@ -1,0 +1,13 @@
+//! What the services that work on calibrated cameras share.
+//!
+//! - [`Models`]: body models out of the store and the catalogue, kept in memory up to a bound.
+//! - [`Silhouettes`]: those of all cameras in a run of frames, out of the clips that jobs left.
+//! - [`views`]: calibration and masks of a gRPC request.
+
+mod models;
+mod silhouettes;
+mod views;
+
+pub use models::{ModelError, Models};
+pub use silhouettes::{CameraClips, Silhouettes, StoredClip, View, named, reports};
+pub use views::{Views, views};

@@ -1,0 +1,80 @@
+use std::time::Instant;
+
+use bytes::Bytes;
+use payloads::{InputFile, JobReport};
+use queue::{Artefact, JobContext, JobError};
+use sqlx::PgPool;
+use store::Store;
+
+use crate::{
+    Config, Error,
+    config::MemoryConfig,
+    database,
+    objects::{self, Input},
+};
+
+/// What all handlers of one process work with.
+#[derive(Debug, Clone)]
+pub struct Resources {
+    /// Where objects are.
+    pub store: Store,
+    /// The database.
+    pub pool: PgPool,
+    /// Bounds on memory.
+    pub memory: MemoryConfig,
+    /// How this process shows in `run.json`.
+    pub worker_name: String,
+}
+
+impl Resources {
+    /// Those of a service of that name.
+    ///
+    /// # Errors
+    /// If the store or the database's URL can't be used. A database that does not answer yet is waited for.
+    pub fn open(config: &Config, service: &str) -> Result<Self, Error> {
+        Ok(Self {
+            pool: database::pool(&config.database)?,
+            store: Store::open(&config.store)?,
+            memory: config.memory.clone(),
+            worker_name: config.worker.name(service),
+        })
+    }
+
+    /// What a job has taken since `started`.
+    pub fn job_report(&self, job: &JobContext, started: Instant, frames: usize) -> JobReport {
+        JobReport {
+            worker: self.worker_name.clone(),
+            attempt: job.attempt(),
+            seconds: started.elapsed().as_secs_f64(),
+            frames,
+        }
+    }
+
+    /// What the jobs that this one waited for have left, in the order in which those were enqueued.
+    ///
+    /// # Errors
+    /// To be tried again if the database does not answer.
+    pub async fn artefacts_before(&self, job: &JobContext) -> Result<Vec<Artefact>, JobError> {
+        let mut connection = self.pool.acquire().await?;
+        let found = queue::dependency_artefacts(&mut connection, job.id()).await?;
+        Ok(found.into_iter().map(|input| input.artefact).collect())
+    }
+
+    /// Reads an uploaded file whole.
+    ///
+    /// # Errors
+    /// As [`objects::read`].
+    pub async fn read_file(&self, file: &InputFile, max_bytes: u64) -> Result<Bytes, JobError> {
+        let input = Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
+        objects::read(&self.store, input, max_bytes).await
+    }
+
+    /// Reads an artefact whole.
+    ///
+    /// # Errors
+    /// As [`objects::read`].
+    pub async fn read_artefact(&self, artefact: &Artefact, max_bytes: u64) -> Result<Bytes, JobError> {
+        let input = Input { name: &artefact.name, store_key: &artefact.store_key, blake3: &artefact.blake3 };
+        objects::read(&self.store, input, max_bytes).await
+    }
+}
