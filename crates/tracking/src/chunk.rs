@@ -36,8 +36,8 @@ pub struct Chunk {
     pub frames: Vec<Tracked>,
 }
 
-/// Tracks a run of frames that begins with number `first`; the tracker stands at the pose of that frame. Every frame is told
-/// as soon as it is done.
+/// Tracks a run of frames that begins with number `first`, by silhouettes alone; the tracker stands at the pose of that frame.
+/// Every frame is told as soon as it is done.
 ///
 /// # Errors
 /// [`Error::View`] if a silhouette or calibration can't be used, [`Error::Stopped`] if `stop` became true.
@@ -46,12 +46,26 @@ pub fn track_chunk<F: AsRef<[(Camera, Silhouette)]>>(
     first: usize,
     frames: impl IntoIterator<Item = F>,
     stop: &AtomicBool,
-    mut each: impl FnMut(&Tracked),
+    each: impl FnMut(&Tracked),
 ) -> Result<Chunk> {
+    let prepare = |(index, views): (usize, F)| ObservedFrame::new(first + index, views.as_ref());
+    track_frames(tracker, frames.into_iter().enumerate().map(prepare), stop, each)
+}
+
+/// The same for frames that are prepared one by one, as they are wanted, such as those with matches of points
+/// ([`ObservedFrame::with_matches`]). What goes wrong with one ends the chunk.
+///
+/// # Errors
+/// That of a frame, or [`Error::Stopped`] if `stop` became true.
+pub fn track_frames<E: From<Error>>(
+    tracker: &mut Tracker<'_>,
+    frames: impl IntoIterator<Item = std::result::Result<ObservedFrame, E>>,
+    stop: &AtomicBool,
+    mut each: impl FnMut(&Tracked),
+) -> std::result::Result<Chunk, E> {
     let mut chunk = Chunk { frames: Vec::new() };
-    for (index, views) in frames.into_iter().enumerate() {
-        let frame = ObservedFrame::new(first + index, views.as_ref())?;
-        let tracked = tracker.track(&frame, stop)?;
+    for frame in frames {
+        let tracked = tracker.track(&frame?, stop)?;
         each(&tracked);
         chunk.frames.push(tracked);
     }

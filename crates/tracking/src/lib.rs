@@ -1,4 +1,5 @@
-//! A person's pose followed through the calibrated silhouettes of several cameras (method §5; MM §4), the shape being known.
+//! A person's pose followed through the calibrated silhouettes of several cameras (method §5; MM §4), the shape being known, and
+//! through points of the skin that cameras find again ([`ObservedFrame::with_matches`]).
 //!
 //! [`Tracker`] takes frame after frame: the pose is predicted, fitted to the contours ([`Tracker::refine`]), judged limb by
 //! limb ([`Misalignment`]), and searched for by particles where limbs are misaligned ([`Tracker::search`]), then fitted again.
@@ -10,6 +11,7 @@
 mod chunk;
 mod error;
 mod joint_limit_term;
+mod lift;
 mod local;
 mod misalignment;
 mod observed_frame;
@@ -20,10 +22,11 @@ mod predict;
 mod prediction_term;
 mod random;
 mod silhouette_term;
+mod texture_term;
 mod tracker;
 mod training_poses;
 
-pub use chunk::{Chunk, ChunkPlan, Merged, Seam, merge, plan_chunks, track_chunk};
+pub use chunk::{Chunk, ChunkPlan, Merged, Seam, merge, plan_chunks, track_chunk, track_frames};
 pub use error::Error;
 pub use joint_limit_term::joint_limit_energy;
 pub use misalignment::{LimbError, Misalignment};

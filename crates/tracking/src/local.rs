@@ -6,7 +6,12 @@ use rayon::prelude::*;
 use shape_fit::{PosedBody, Quadratic, Scratch, Term, Weighting, add_pose};
 use vision::Topology;
 
-use crate::ObservedFrame;
+use crate::{
+    ObservedFrame,
+    lift::SurfacePoint,
+    observed_frame::ObservedView,
+    texture_term::{TextureScratch, TextureTerm},
+};
 
 /// One step from coarse to fine.
 #[derive(Debug, Clone, Copy)]
@@ -14,20 +19,27 @@ struct Step {
     /// resolution: index of the observation's level
     level: usize,
     weighting: Weighting,
+    /// σ of the robust weight of points of the skin, metres
+    texture_m: f64,
     evaluations: usize,
 }
 
-const fn step(level: usize, scale_m: f64, tangential: f64, normal_m: f64, evaluations: usize) -> Step {
-    Step { level, weighting: Weighting { scale_m, tangential, normal_m }, evaluations }
+const fn step(
+    level: usize,
+    [scale_m, tangential, normal_m]: [f64; 3],
+    texture_m: f64,
+    evaluations: usize,
+) -> Step {
+    Step { level, weighting: Weighting { scale_m, tangential, normal_m }, texture_m, evaluations }
 }
 
 /// Limbs move by up to 20 cm from frame to frame: far first, then exactly.
 const STEPS: [Step; 5] = [
-    step(0, 0.25, 0.5, 0.15, 3),
-    step(0, 0.12, 0.3, 0.10, 4),
-    step(0, 0.06, 0.1, 0.06, 4),
-    step(0, 0.03, 0.03, 0.05, 4),
-    step(1, 0.02, 0.01, 0.04, 3),
+    step(0, [0.25, 0.5, 0.15], 0.10, 3),
+    step(0, [0.12, 0.3, 0.10], 0.06, 4),
+    step(0, [0.06, 0.1, 0.06], 0.04, 4),
+    step(0, [0.03, 0.03, 0.05], 0.025, 4),
+    step(1, [0.02, 0.01, 0.04], 0.02, 3),
 ];
 /// Standard deviations of angles and of twists about the prediction, radians: wide, for what no silhouette tells.
 const ANGLE: f64 = 0.5;
@@ -43,7 +55,7 @@ pub struct Local {
     /// the body in the pose that was evaluated last
     pub body: PosedBody,
     /// of every view
-    scratches: Vec<Scratch>,
+    scratches: Vec<(Scratch, TextureScratch)>,
 }
 
 /// What doesn't change while a pose is fitted.
@@ -52,6 +64,8 @@ pub struct Problem<'a> {
     pub model: &'a BodyModel,
     pub topology: &'a Topology,
     pub frame: &'a ObservedFrame,
+    /// points of the skin that every view found again, shape `[views]`
+    pub points: &'a [Vec<SurfacePoint>],
     pub predicted: &'a [f64],
     pub options: &'a shape_fit::Options,
 }
@@ -127,15 +141,26 @@ impl Local {
 
     /// Half the Hessian (Gauss–Newton), half the gradient, and the energy.
     fn linearise(&mut self, problem: &Problem<'_>, pose: &[f64], step: &Step) -> System {
-        let Problem { model, topology, frame, predicted, options } = *problem;
+        let Problem { model, topology, frame, points, predicted, options } = *problem;
         self.body.pose(model, pose);
-        self.scratches.resize_with(frame.views.len().max(self.scratches.len()), Scratch::default);
+        self.scratches.resize_with(frame.views.len().max(self.scratches.len()), Default::default);
         let weighting = step.weighting;
         let term = Term { model, topology, body: &self.body, weighting, components: 0, options };
-        let evaluate = |(view, scratch): (&crate::observed_frame::ObservedView, &mut Scratch)| {
-            term.evaluate(&view.observation.levels[step.level], scratch)
+        let texture = self.body.shape.as_ref().map(|shape| TextureTerm {
+            model,
+            shape,
+            posed: &self.body.posed,
+            scale_m: step.texture_m,
+        });
+        let views = frame.views.par_iter().zip(points).zip(&mut self.scratches);
+        let evaluate = |((view, points), (scratch, of_texture)): ((&ObservedView, &Vec<_>), &mut (_, _))| {
+            let mut found = term.evaluate(&view.observation.levels[step.level], scratch);
+            if let Some(texture) = &texture {
+                texture.add(points, of_texture, &mut found);
+            }
+            found
         };
-        let found: Vec<Quadratic> = frame.views.par_iter().zip(&mut self.scratches).map(evaluate).collect();
+        let found: Vec<Quadratic> = views.map(evaluate).collect();
         let dofs = pose.len();
         let mut system =
             System { matrix: DMatrix::zeros(dofs, dofs), gradient: DVector::zeros(dofs), energy: 0.0 };

@@ -1,4 +1,4 @@
-use model::{Camera, Silhouette};
+use model::{Camera, PointMatch, Silhouette};
 use rayon::prelude::*;
 use shape_fit::Observation;
 use vision::{Observed, View, reduced};
@@ -29,6 +29,8 @@ pub(crate) struct ObservedView {
     pub reduced: View,
     /// what was seen, in that view
     pub observed: Observed,
+    /// points that the camera saw in frames before, and sees now
+    pub matches: Vec<PointMatch>,
 }
 
 impl ObservedFrame {
@@ -43,7 +45,13 @@ impl ObservedFrame {
             let scale = ((height as f64 / HEIGHT_PX).round() as usize).max(1);
             let reduced_view = View::reduced(calibration, scale);
             let observed = Observed::new(reduced(&observation.silhouette, scale));
-            Ok(Some(ObservedView { camera, observation, reduced: reduced_view, observed }))
+            Ok(Some(ObservedView {
+                camera,
+                observation,
+                reduced: reduced_view,
+                observed,
+                matches: Vec::new(),
+            }))
         };
         let prepared: Vec<_> = views.par_iter().enumerate().map(prepare).collect();
         let mut found = Vec::with_capacity(views.len());
@@ -51,6 +59,16 @@ impl ObservedFrame {
             found.extend(view.map_err(|source| Error::View { frame: index, source })?);
         }
         Ok(Self { index, views: found, num_cameras: views.len() })
+    }
+
+    /// With points that a camera (index among those of the frame) found again, pixels of its image at this frame and frames
+    /// before; they take the place of those it had. A camera that sees nobody has none.
+    #[must_use]
+    pub fn with_matches(mut self, camera: usize, matches: &[PointMatch]) -> Self {
+        if let Some(view) = self.views.iter_mut().find(|view| view.camera == camera) {
+            view.matches = matches.to_vec();
+        }
+        self
     }
 
     /// Number of cameras that see somebody.

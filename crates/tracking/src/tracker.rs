@@ -9,6 +9,7 @@ use vision::{Rasteriser, Topology, View};
 
 use crate::{
     Error, Misalignment, ObservedFrame, Options, Part, Parzen, PoseSpace, Result, Search, built_in_poses,
+    lift::Lifter,
     local::{Local, Problem},
     misalignment::Judge,
     particles::{Particles, Space},
@@ -77,6 +78,7 @@ pub struct Tracker<'a> {
     local: Local,
     judge: Judge,
     particles: Particles,
+    lifter: Lifter,
     before: Vec<f64>,
     last: Vec<f64>,
 }
@@ -117,6 +119,7 @@ impl<'a> Tracker<'a> {
             local: Local::new(model.shape(alpha)),
             judge: Judge::default(),
             particles: Particles::default(),
+            lifter: Lifter::default(),
             before: start.to_vec(),
             last: start.to_vec(),
         })
@@ -129,6 +132,7 @@ impl<'a> Tracker<'a> {
     pub fn restart(&mut self, pose: &[f64]) -> Result<()> {
         check_pose(self.model, pose)?;
         (self.before, self.last) = (pose.to_vec(), pose.to_vec());
+        self.lifter.forget();
         Ok(())
     }
 
@@ -182,11 +186,12 @@ impl<'a> Tracker<'a> {
             // from a wrong pose to a right one is no velocity
             self.before.clone_from(&self.last);
         }
+        self.lifter.remember(frame.index, &self.last, &misalignment);
         Ok(self.tracked(frame, misalignment, stage, effective_sample_size))
     }
 
-    /// Local optimisation: the pose that a frame's contours pull the best of several starts to, with the prior about
-    /// `prediction`. `None` if `goes_on` said no.
+    /// Local optimisation: the pose that a frame's contours, and its matches with frames that were tracked, pull the best of
+    /// several starts to, with the prior about `prediction`. `None` if `goes_on` said no.
     pub fn refine(
         &mut self,
         frame: &ObservedFrame,
@@ -194,10 +199,15 @@ impl<'a> Tracker<'a> {
         starts: &[&[f64]],
         goes_on: &dyn Fn() -> bool,
     ) -> Option<Vec<f64>> {
+        let points = match &self.local.body.shape {
+            Some(shape) => self.lifter.lift(self.model, &self.topology, shape, frame),
+            None => vec![Vec::new(); frame.num_views()],
+        };
         let problem = Problem {
             model: self.model,
             topology: &self.topology,
             frame,
+            points: &points,
             predicted: prediction,
             options: &self.options.fit,
         };
