@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::{
     bench, body, cmu, connection::Server, database, demo, evaluate, health, keys, live, marker_sets, results,
-    run, sample, serve, status, up, upload,
+    run, sample, sample_capture, serve, status, up, upload,
 };
 
 /// Full-body motion from a few control points.
@@ -58,6 +58,7 @@ enum Command {
     /// Measure how fast the parts are, on recordings of your own
     Bench(bench::Args),
     Sample(sample::Args),
+    SampleCapture(sample_capture::Args),
     /// Get recorded motion from public collections
     #[command(subcommand)]
     Data(Data),
@@ -93,6 +94,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Evaluate(args) => evaluate::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Sample(args) => sample::run(&args),
+        Command::SampleCapture(args) => sample_capture::run(&args),
         Command::Data(Data::Cmu(args)) => cmu::run(&args),
         Command::Serve(service) => serve::run(&service),
         Command::Migrate(args) => keys::migrate(&args),

@@ -20,6 +20,7 @@ mod pack;
 mod results;
 mod run;
 mod sample;
+mod sample_capture;
 mod serve;
 mod session_files;
 mod status;
