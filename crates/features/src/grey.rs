@@ -4,6 +4,8 @@ use model::{Image, Silhouette};
 
 /// Larger regions are reduced by two along each side until they are smaller, pixels: work and memory are bounded.
 const MAX_PIXELS: usize = 1_600_000;
+/// Smaller ones are doubled, pixels: on a person of less than 600 pixels, forearms are too thin for the first octave.
+const DOUBLED: usize = 200_000;
 /// Pixels around the person that are taken with it: what the widest Gaussian of the first octave reaches.
 const AROUND: usize = 8;
 
@@ -14,7 +16,7 @@ pub struct Grey {
     pub height: usize,
     /// pixel of the picture that the first value stands for, its centre
     pub origin: [f64; 2],
-    /// pixels of the picture from value to value
+    /// pixels of the picture from value to value: 0.5 where it was doubled
     pub step: f64,
     /// 0 is black, 1 white; the person's mean outside the person, so that nothing depends on the background; shape
     /// `[height, width]`
@@ -63,7 +65,29 @@ impl Grey {
             };
             self.inside.extend((0..self.width).map(is_inside));
         }
-        self.fill_background()
+        if !self.fill_background() {
+            return false;
+        }
+        if block == 1 && self.width * self.height < DOUBLED {
+            self.double();
+        }
+        true
+    }
+
+    /// Puts a value between each two, along both sides.
+    fn double(&mut self) {
+        let [width, height] = [self.width, self.height];
+        let (values, inside) = (std::mem::take(&mut self.values), std::mem::take(&mut self.inside));
+        for y in 0..2 * height - 1 {
+            let [above, below] = [y / 2, y.div_ceil(2)].map(|row| row * width);
+            for x in 0..2 * width - 1 {
+                let [left, right] = [x / 2, x.div_ceil(2)];
+                let around = [above + left, above + right, below + left, below + right];
+                self.values.push(around.iter().map(|&at| values[at]).sum::<f32>() / 4.0);
+                self.inside.push(around.iter().fold(1, |all, &at| all & inside[at]));
+            }
+        }
+        (self.width, self.height, self.step) = (2 * width - 1, 2 * height - 1, 0.5);
     }
 
     /// Gives the background the person's mean; `false` without a person.

@@ -10,9 +10,9 @@ pub const SCALES: usize = 3;
 pub const LAYERS: usize = SCALES + 3;
 /// Width of the first Gaussian of every octave, its pixels.
 pub const FIRST: f64 = 1.6;
-/// Width that the picture itself has, pixels.
+/// Width that the picture itself has, its pixels.
 const OF_PICTURE: f64 = 0.5;
-/// Most octaves: a person of 400 pixels has few features wider than those of the fourth.
+/// Most octaves: a person has few features wider than those of the fourth.
 const MAX_OCTAVES: usize = 4;
 /// Smallest side of an octave, pixels.
 const LEAST_SIDE: usize = 12;
@@ -61,7 +61,8 @@ impl ScaleSpace {
             (octave.width, octave.height) = (width, height);
             match before.last() {
                 None => {
-                    let added = (FIRST * FIRST - OF_PICTURE * OF_PICTURE).sqrt();
+                    let has = OF_PICTURE / grey.step.min(1.0);
+                    let added = (FIRST * FIRST - has * has).sqrt();
                     blur(&grey.values, [width, height], added, &mut self.buffers, &mut octave.layers[0]);
                     octave.inside.clone_from(&grey.inside);
                 }

@@ -7,7 +7,8 @@ use model::{Image, Silhouette};
 use nalgebra::Vector2;
 use textured::{Change, NONE, picture};
 
-const SIZE: [usize; 2] = [420, 360];
+/// So large that it isn't doubled.
+const SIZE: [usize; 2] = [620, 540];
 
 /// What came of a change.
 #[derive(Debug)]
@@ -74,7 +75,6 @@ fn features_are_found_again_after_a_turn() {
 
 #[test]
 fn features_are_found_again_at_another_scale() {
-    // at 0.8 the finest features are too fine
     for (scale, repeated, matched) in [(0.8, 0.60, 0.55), (1.15, 0.85, 0.80)] {
         check(&format!("scale {scale}"), Change { scale, ..NONE }, repeated, matched);
     }
@@ -90,6 +90,23 @@ fn features_are_found_again_in_other_light_and_noise() {
 }
 
 #[test]
+fn small_pictures_are_doubled_and_give_finer_features() {
+    let size = [210, 180];
+    let (image, inside) = picture(size, NONE, 1);
+    let change = Change { turn: 0.3, ..NONE };
+    let (other, other_inside) = picture(size, change, 2);
+    let options = Options { reach: 1.0, ..Options::default() };
+    let (before, now) = (detect(&image, &inside, &options), detect(&other, &other_inside, &options));
+    let fine = before.points.iter().filter(|point| point.scale_px < 1.6).count();
+    let pairs = match_features(&before, &now, &options);
+    let miss =
+        |[i, j]: &[usize; 2]| (change.place(before.points[*i].pixel, size) - now.points[*j].pixel).norm();
+    let right = pairs.iter().filter(|pair| miss(pair) < 1.5).count();
+    println!("{fine} fine of {} features, {right} right of {} matches", before.points.len(), pairs.len());
+    assert!(fine > 25 && pairs.len() > 120 && right as f64 > 0.98 * pairs.len() as f64);
+}
+
+#[test]
 fn features_lie_inside_and_none_is_of_the_background() {
     let options = Options::default();
     let (image, inside) = picture(SIZE, NONE, 1);
@@ -99,7 +116,7 @@ fn features_lie_inside_and_none_is_of_the_background() {
         let far = |dx: isize, dy: isize| {
             inside.contains(point.pixel.x.round() as isize + dx, point.pixel.y.round() as isize + dy)
         };
-        assert!(far(0, 0) && far(3, 0) && far(-3, 0) && far(0, 3) && far(0, -3), "{point:?}");
+        assert!(far(0, 0) && far(2, 0) && far(-2, 0) && far(0, 2) && far(0, -2), "{point:?}");
     }
     // the background may be anything
     let mut dark = image.clone();
@@ -155,7 +172,7 @@ fn a_stream_of_pictures_gives_the_points_of_neighbours() {
         };
         let right = matches.iter().filter(|found| miss(found) < 2.0).count();
         println!("frame {frame}: {right} of {} matches", matches.len());
-        assert!(matches.len() > 120 && right as f64 > 0.97 * matches.len() as f64);
+        assert!(matches.len() > 120 && right as f64 > 0.98 * matches.len() as f64);
         assert!(matches.iter().all(|found| found.frames_back == 1));
     }
 }

@@ -16,7 +16,7 @@ const REMEMBERED: usize = 16;
 const LEAST_COSINE: f64 = 0.25;
 /// So many points of a limb in a view count in full; more share their weight, for what the body can't express shifts all of them
 /// alike.
-const POINTS_A_LIMB: f64 = 4.0;
+const POINTS_A_LIMB: f64 = 8.0;
 
 /// A point of the skin, and the ray on which it is seen now.
 #[derive(Debug, Clone, Copy, PartialEq)]

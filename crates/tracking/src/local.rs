@@ -35,11 +35,11 @@ const fn step(
 
 /// Limbs move by up to 20 cm from frame to frame: far first, then exactly.
 const STEPS: [Step; 5] = [
-    step(0, [0.25, 0.5, 0.15], 0.10, 3),
-    step(0, [0.12, 0.3, 0.10], 0.06, 4),
-    step(0, [0.06, 0.1, 0.06], 0.04, 4),
-    step(0, [0.03, 0.03, 0.05], 0.025, 4),
-    step(1, [0.02, 0.01, 0.04], 0.02, 3),
+    step(0, [0.25, 0.5, 0.15], 0.04, 3),
+    step(0, [0.12, 0.3, 0.10], 0.025, 4),
+    step(0, [0.06, 0.1, 0.06], 0.015, 4),
+    step(0, [0.03, 0.03, 0.05], 0.01, 4),
+    step(1, [0.02, 0.01, 0.04], 0.008, 3),
 ];
 /// Standard deviations of angles and of twists about the prediction, radians: wide, for what no silhouette tells.
 const ANGLE: f64 = 0.5;
