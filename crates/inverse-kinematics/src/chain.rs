@@ -12,6 +12,8 @@ pub struct Chain {
     pub(crate) segments: Vec<[usize; 2]>,
     /// lowest and highest value of every coordinate
     pub(crate) limits: Vec<[f64; 2]>,
+    /// of the image support at each point, relative
+    pub(crate) widths: Vec<f64>,
 }
 
 impl Chain {
@@ -30,7 +32,8 @@ impl Chain {
         let kinematics = Kinematics::new(skeleton, parametrisation);
         let points = PointSet::new(&kinematics, points);
         let limits = vec![[f64::NEG_INFINITY, f64::INFINITY]; kinematics.num_dofs()];
-        Ok(Self { kinematics, points, segments: Vec::new(), limits })
+        let widths = vec![1.0; points.len()];
+        Ok(Self { kinematics, points, segments: Vec::new(), limits, widths })
     }
 
     /// The same chain with straight segments between pairs of its points, which the overlap with images is taken along.
@@ -43,6 +46,23 @@ impl Chain {
             return Err(Error::UnknownPoint { what: "a segment", point, points });
         }
         self.segments = segments;
+        Ok(self)
+    }
+
+    /// The same chain with flesh of different widths: by how much the image support's slope inside is wider at each point than
+    /// [`crate::SupportWidth`] has it, shape `[points]`.
+    ///
+    /// # Errors
+    /// [`Error::Count`] or [`Error::Setting`] with the first that is wrong.
+    pub fn with_widths(mut self, widths: Vec<f64>) -> Result<Self> {
+        let (found, expected) = (widths.len(), self.points.len());
+        if found != expected {
+            return Err(Error::Count { what: "widths", found, expected });
+        }
+        if let Some(&value) = widths.iter().find(|&&width| !(width > 0.0 && width.is_finite())) {
+            return Err(Error::Setting { name: "width of a point", value, expected: "a positive number" });
+        }
+        self.widths = widths;
         Ok(self)
     }
 

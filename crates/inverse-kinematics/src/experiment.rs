@@ -13,12 +13,15 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use vision::{DistanceField, Rasteriser, Topology, View, scene::Ring};
 
+use crate::method::POSTURE;
 use crate::{Error, ImageView, Options, Result, Support, SupportWidth, limb};
 
 mod recording;
+mod still;
 mod tracked;
 
 pub use recording::Recording;
+pub use still::Still;
 use tracked::Tracked;
 
 /// Joints of the CMU skeleton that correspond to the rig's; the last of each limb stands at the end of the one before.
@@ -86,6 +89,13 @@ fn rig_joints(model: &BodyModel, names: [&'static str; 3]) -> Result<[usize; 3]>
     Ok(found)
 }
 
+/// Heading of the line between both shoulders or hips, radians.
+fn heading(model: &BodyModel, limbs: Limbs, posed: &Posed) -> Result<f64> {
+    let [left, right] = limbs.indices().map(|index| rig_joints(model, LIMBS[index].1));
+    let across = posed.joints[left?[0]] - posed.joints[right?[0]];
+    Ok((-across.z).atan2(across.x))
+}
+
 /// How a limb is found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Method {
@@ -95,7 +105,9 @@ pub struct Method {
     pub options: Options,
     /// cameras used, by number
     pub cameras: Vec<usize>,
-    /// slopes of the image support
+    /// whether the inner joint is a hinge and turns are limited; otherwise both joints are balls
+    pub has_limits: bool,
+    /// slopes of the image support; inside, the flesh's own width counts
     pub width: SupportWidth,
     /// turns of the last frame's inner joint about the line from base to end that every frame is started from, radians;
     /// what agrees best with images and posture is taken, the first in doubt
@@ -103,12 +115,18 @@ pub struct Method {
 }
 
 impl Method {
-    /// Plain inverse kinematics.
+    /// Plain inverse kinematics as printed: two ball joints.
     pub fn plain() -> Self {
+        Self { name: "IK".into(), has_limits: false, ..Self::limited() }
+    }
+
+    /// Plain inverse kinematics of a limb that bends as limbs do.
+    pub fn limited() -> Self {
         Self {
-            name: "IK".into(),
+            name: "IK + limits".into(),
             options: Options::reach(&[limb::END]),
             cameras: Vec::new(),
+            has_limits: true,
             width: SupportWidth::default(),
             swivels: vec![0.0],
         }
@@ -121,6 +139,7 @@ impl Method {
             name: "priority IK".into(),
             options,
             cameras: Vec::new(),
+            has_limits: true,
             width: SupportWidth::default(),
             swivels: vec![0.0],
         }
@@ -135,22 +154,21 @@ impl Method {
             name: format!("IK + view {}", names.join(" and ")),
             options,
             cameras: cameras.to_vec(),
+            has_limits: true,
             width: limbs.width(),
             swivels: vec![0.0, SWIVEL, -SWIVEL],
         }
     }
 
-    /// What the paper compares, and priority inverse kinematics: no view, the first, the second, both.
+    /// What the paper compares, and what joint limits and a posture do without images: no view, the first, the second, both.
     pub fn all(limbs: Limbs) -> Vec<Self> {
         let images = [&[0][..], &[1], &[0, 1]].map(|cameras| Self::image(limbs, cameras));
-        [Self::plain(), Self::priority()].into_iter().chain(images).collect()
+        [Self::plain(), Self::limited(), Self::priority()].into_iter().chain(images).collect()
     }
 }
 
-/// Weight of the neutral posture beside the overlap, an inverse square radian. Tuned, as the widths of the support and the
-/// swivel, on trials 13_17 and 07_01 of the CMU database.
-const POSTURE: f64 = 0.8;
-/// How far to either side the last frame's elbow or knee is tried, radians.
+/// How far to either side the last frame's elbow or knee is tried, radians. Tuned on trials 13_17 and 07_01 of the CMU database,
+/// as the widths of the support.
 const SWIVEL: f64 = 0.5;
 
 /// How far the inner joints were from the truth, millimetres, and the ends from their targets.
@@ -205,9 +223,7 @@ pub fn run(
             Arc::new(DistanceField::new(&see(silhouette, frame, camera), 1))
         });
         let fields: Vec<_> = fields.collect();
-        let [left, right] = limbs.indices().map(|index| rig_joints(model, LIMBS[index].1));
-        let across = posed.joints[left?[0]] - posed.joints[right?[0]];
-        let heading = (-across.z).atan2(across.x);
+        let heading = heading(model, limbs, &posed)?;
         for (index, limb) in tracked.iter_mut().enumerate() {
             let [base, inner, end] = limb.bones.map(|joint| posed.joints[joint]);
             let seen: Vec<_> = limb

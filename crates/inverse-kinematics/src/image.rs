@@ -23,12 +23,19 @@ pub struct Overlap {
     /// derivative of h with respect to each point, a metre, shape `[points]`
     pub by_point: Vec<Vector3<f64>>,
     samples: usize,
+    /// relative width of the support at each point
+    widths: Vec<f64>,
 }
 
 impl Overlap {
     /// Memory for the chain's points; `samples` is the number of samples on a segment.
     pub fn new(chain: &Chain, samples: usize) -> Self {
-        Self { value: 0.0, by_point: vec![Vector3::zeros(); chain.points.len()], samples }
+        Self {
+            value: 0.0,
+            by_point: vec![Vector3::zeros(); chain.points.len()],
+            samples,
+            widths: chain.widths.clone(),
+        }
     }
 
     /// Takes the overlap of the segments between `positions` (metres, shape `[points]`) with the views.
@@ -42,9 +49,9 @@ impl Overlap {
                 let (mut by_start, mut by_end) = (nalgebra::Vector2::zeros(), nalgebra::Vector2::zeros());
                 for sample in 0..self.samples {
                     let t = (sample as f64 + 0.5) / self.samples as f64;
-                    let Some((value, gradient)) = view.support.sample(start + (end - start) * t) else {
-                        continue;
-                    };
+                    let width = self.widths[from] * (1.0 - t) + self.widths[to] * t;
+                    let seen = view.support.sample(start + (end - start) * t, width);
+                    let Some((value, gradient)) = seen else { continue };
                     sum += value;
                     count += 1;
                     by_start += gradient * (1.0 - t);

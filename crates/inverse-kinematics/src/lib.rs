@@ -11,6 +11,7 @@
 //!   null space is used for.
 //! - [`Support`], [`ImageView`]: silhouettes made ready. Any number of views.
 //! - [`Solver`]: the steps. They take no memory.
+//! - [`Figure`], [`follow::Follower`]: a body or a skeleton through frames of measured points and silhouettes, by a [`Method`].
 //! - [`experiment`]: limbs of recorded motion seen by synthetic cameras.
 //!
 //! ```
@@ -35,9 +36,13 @@
 mod chain;
 mod error;
 pub mod experiment;
+mod figure;
+pub mod flesh;
+pub mod follow;
 mod gain;
 mod image;
 pub mod limb;
+mod method;
 mod options;
 mod priority;
 pub mod rig;
@@ -46,7 +51,9 @@ mod support;
 
 pub use chain::Chain;
 pub use error::Error;
+pub use figure::Figure;
 pub use image::{ImageView, Overlap};
+pub use method::Method;
 pub use options::{Criterion, Options, Task};
 pub use priority::Priorities;
 pub use solver::{Evidence, Outcome, Solver};

@@ -4,6 +4,7 @@ use kinematics::{ControlPoint, HEADING, Parametrisation, ROOT_DOFS, References, 
 use model::{Axis, Channel, Joint, Skeleton};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
+use crate::flesh::Flesh;
 use crate::{Chain, Result};
 
 /// Index of the chain's point at the shoulder or hip.
@@ -19,9 +20,6 @@ pub const LOWER: usize = ROOT_DOFS + 3;
 /// Number of coordinates.
 pub const DOFS: usize = ROOT_DOFS + 6;
 
-/// How far an inner joint gives way about other axes than its hinge, radians.
-const PLAY: f64 = 0.15;
-
 /// Bones and limits of a limb.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Build {
@@ -35,11 +33,14 @@ pub struct Build {
     pub bend: [f64; 2],
     /// least and greatest turn of the upper bone about itself, radians; it decides on which side the inner joint can be
     pub twist: [f64; 2],
-    /// the middle of the flesh along the upper bone, from shoulder or hip at rest, metres; it is what images show, and bones
-    /// do not run through it. Empty: the bone itself.
-    pub upper_middle: Vec<Vector3<f64>>,
-    /// the middle of the flesh along the lower bone, from elbow or knee at rest, metres
-    pub lower_middle: Vec<Vector3<f64>>,
+    /// how far the inner joint gives way about other axes than its hinge, radians
+    pub play: f64,
+    /// half width of the flesh for which the slopes of image supports are made, metres
+    pub half_width_m: f64,
+    /// flesh along the upper bone, from shoulder or hip; with none at all, images show the bones
+    pub upper_flesh: Vec<Flesh>,
+    /// flesh along the lower bone, from elbow or knee
+    pub lower_flesh: Vec<Flesh>,
 }
 
 /// A limb as a chain. Its rotation vectors have their first axis along the hinge and their second along the upper bone.
@@ -78,8 +79,11 @@ impl Limb {
             point("inner", 2, Vector3::zeros()),
             point("end", 2, build.lower),
         ];
-        let upper = build.upper_middle.iter().map(|&middle| point("upper", 1, middle));
-        points.extend(upper.chain(build.lower_middle.iter().map(|&middle| point("lower", 2, middle))));
+        let mut widths = vec![1.0; points.len()];
+        for (joint, name, flesh) in [(1, "upper", &build.upper_flesh), (2, "lower", &build.lower_flesh)] {
+            points.extend(flesh.iter().map(|flesh| point(name, joint, flesh.middle)));
+            widths.extend(flesh.iter().map(|flesh| (flesh.half_width_m / build.half_width_m).max(0.1)));
+        }
         let segments = if points.len() > 4 {
             (END + 1..points.len() - 1).map(|from| [from, from + 1]).collect()
         } else {
@@ -90,9 +94,11 @@ impl Limb {
         limits[UPPER..LOWER].fill([f64::NEG_INFINITY, f64::INFINITY]);
         limits[UPPER + 1] = build.twist;
         limits[LOWER] = build.bend;
-        limits[LOWER + 1..].fill([-PLAY, PLAY]);
-        let chain =
-            Chain::new(&skeleton, parametrisation, points)?.with_segments(segments)?.with_limits(limits)?;
+        limits[LOWER + 1..].fill([-build.play, build.play]);
+        let chain = Chain::new(&skeleton, parametrisation, points)?
+            .with_segments(segments)?
+            .with_widths(widths)?
+            .with_limits(limits)?;
         Ok(Self { chain, rest_from_axes })
     }
 

@@ -65,16 +65,18 @@ impl Support {
         Self::new(field, pixels(width.inside_m), pixels(width.outside_m))
     }
 
-    /// Value in [−1, 1] and its derivative, a pixel, at a position; `None` beyond the image.
+    /// Value in [−1, 1] and its derivative, a pixel, at a position; `None` beyond the image. The slope inside is `width` times
+    /// as wide as the support's, at least a pixel.
     #[inline]
-    pub fn sample(&self, pixel: Vector2<f64>) -> Option<(f64, Vector2<f64>)> {
+    pub fn sample(&self, pixel: Vector2<f64>, width: f64) -> Option<(f64, Vector2<f64>)> {
         if !self.field.contains(pixel) {
             return None;
         }
         let (distance, gradient) = self.field.sample_with_gradient(pixel);
         let (value, slope) = if distance >= 0.0 {
-            let s = (distance / self.inside).min(1.0);
-            (s * (2.0 - s), 2.0 * (1.0 - s) / self.inside)
+            let inside = (width * self.inside).max(1.0);
+            let s = (distance / inside).min(1.0);
+            (s * (2.0 - s), 2.0 * (1.0 - s) / inside)
         } else if distance > -self.outside {
             (distance / self.outside, 1.0 / self.outside)
         } else {
@@ -101,23 +103,23 @@ mod tests {
     #[test]
     fn the_support_lies_between_minus_one_and_one_and_is_zero_at_the_outline() {
         let support = Support::new(Arc::new(DistanceField::new(&square(), 1)), 8.0, 20.0);
-        let at = |x: f64| support.sample(Vector2::new(x, 40.0)).unwrap().0;
+        let at = |x: f64| support.sample(Vector2::new(x, 40.0), 1.0).unwrap().0;
         assert!((at(50.0) - 1.0).abs() < 1e-12);
         assert!(at(29.5).abs() < 1e-12);
         assert!((at(5.0) + 1.0).abs() < 1e-12);
         assert!(at(24.0) < at(27.0) && at(27.0) < 0.0 && 0.0 < at(32.0) && at(32.0) < at(35.0));
-        assert_eq!(support.sample(Vector2::new(-3.0, 40.0)), None);
+        assert_eq!(support.sample(Vector2::new(-3.0, 40.0), 1.0), None);
     }
 
     #[test]
     fn the_gradient_is_that_of_differences() {
         let support = Support::new(Arc::new(DistanceField::new(&square(), 1)), 8.0, 20.0);
         for at in [Vector2::new(33.3, 41.7), Vector2::new(22.4, 35.3), Vector2::new(50.2, 30.3)] {
-            let (_, gradient) = support.sample(at).unwrap();
+            let (_, gradient) = support.sample(at, 1.0).unwrap();
             for axis in 0..2 {
                 let mut step = Vector2::zeros();
                 step[axis] = 1e-6;
-                let value = |at| support.sample(at).unwrap().0;
+                let value = |at| support.sample(at, 1.0).unwrap().0;
                 let slope = (value(at + step) - value(at - step)) / 2e-6;
                 assert!((slope - gradient[axis]).abs() < 1e-6, "{slope} {} at {at}", gradient[axis]);
             }

@@ -28,7 +28,7 @@ fn a_chain_of_a_rig_puts_joints_where_the_body_does() {
     let (pose, chain) = (pose(&model), &rig.chain);
     let mut x = vec![0.0; chain.num_dofs()];
     rig.coordinates(&pose, &mut x);
-    let mut positions = vec![Vector3::zeros(); model.rig().num_joints()];
+    let mut positions = vec![Vector3::zeros(); chain.points().len()];
     chain.points().positions(chain.kinematics(), &x, &mut chain.kinematics().state(), &mut positions);
     for ((found, expected), joint) in positions.iter().zip(posed(&model, &pose)).zip(model.rig().joints()) {
         assert!((found - expected).norm() < 1e-9, "{}: {found} {expected}", joint.name);
@@ -54,7 +54,7 @@ fn hands_feet_head_and_hips_move_the_whole_body() {
     let mut x = vec![0.0; rig.chain.num_dofs()];
     rig.coordinates(&start, &mut x);
     let posture = x.clone();
-    let mut targets = vec![None; joints.len()];
+    let mut targets = vec![None; rig.chain.points().len()];
     for joint in pursued {
         targets[joint] = Some(joints[joint]);
     }

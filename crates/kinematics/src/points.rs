@@ -15,23 +15,48 @@ pub struct ControlPoint {
 }
 
 /// The papers' control points and the joints that may stand for each, with `true` where the far end of the
-/// joint's bone is meant: names of the CMU skeleton first, then those of common BVH rigs.
+/// joint's bone is meant: names of the CMU skeleton first, then those of common BVH rigs and of
+/// morphable bodies.
 const STANDARD: [(&str, &[(&str, bool)]); 6] = [
     (
         "left_wrist",
-        &[("lhand", false), ("LeftHand", false), ("mixamorig:LeftHand", false), ("LeftWrist", false)],
+        &[
+            ("lhand", false),
+            ("LeftHand", false),
+            ("mixamorig:LeftHand", false),
+            ("LeftWrist", false),
+            ("l_wrist", false),
+        ],
     ),
     (
         "right_wrist",
-        &[("rhand", false), ("RightHand", false), ("mixamorig:RightHand", false), ("RightWrist", false)],
+        &[
+            ("rhand", false),
+            ("RightHand", false),
+            ("mixamorig:RightHand", false),
+            ("RightWrist", false),
+            ("r_wrist", false),
+        ],
     ),
     (
         "left_ankle",
-        &[("lfoot", false), ("LeftFoot", false), ("mixamorig:LeftFoot", false), ("LeftAnkle", false)],
+        &[
+            ("lfoot", false),
+            ("LeftFoot", false),
+            ("mixamorig:LeftFoot", false),
+            ("LeftAnkle", false),
+            ("l_ankle", false),
+        ],
     ),
     (
         "right_ankle",
-        &[("rfoot", false), ("RightFoot", false), ("mixamorig:RightFoot", false), ("RightAnkle", false)],
+        &[
+            ("rfoot", false),
+            ("RightFoot", false),
+            ("mixamorig:RightFoot", false),
+            ("RightAnkle", false),
+            ("r_ankle", false),
+        ],
     ),
     ("root", &[("root", false), ("Hips", false), ("hip", false), ("mixamorig:Hips", false)]),
     ("head", &[("head", true), ("Head", true), ("mixamorig:Head", true)]),

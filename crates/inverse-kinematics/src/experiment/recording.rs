@@ -107,7 +107,7 @@ impl Puppet {
         pose[..3].copy_from_slice(shift.as_slice());
         pose[3..6].copy_from_slice(kinematics::rotation_log(&rotation).as_slice());
         self.rig.coordinates(&pose, &mut self.x);
-        let mut targets = vec![None; self.rest.len()];
+        let mut targets = vec![None; self.rig.chain.points().len()];
         for (index, limb) in self.limbs.iter().enumerate() {
             let mut at = self.rest[0] + shift + rotation * (self.rest[limb[0]] - self.rest[0]);
             for bone in 0..2 {

@@ -2,17 +2,20 @@ use body::{BodyModel, Shape};
 use nalgebra::Vector3;
 
 use super::{LIMBS, Limbs, Method, rig_joints};
+use crate::flesh::along;
 use crate::limb::{self, Build, Limb};
 use crate::{Error, Evidence, ImageView, Result, Solver, SupportWidth};
 
 /// One limb being followed by one method.
 pub(super) struct Tracked {
-    limb: Limb,
-    solver: Solver,
-    x: Vec<f64>,
+    pub limb: Limb,
+    pub solver: Solver,
+    /// the last solution
+    pub x: Vec<f64>,
     /// place of the inner joint, metres
     pub found: Vector3<f64>,
-    posture: Vec<f64>,
+    /// preferred
+    pub posture: Vec<f64>,
     /// the rig's joints: base, inner, end
     pub bones: [usize; 3],
     /// cameras, by number
@@ -37,15 +40,18 @@ impl Tracked {
         // the rig's last rotation at the base is about the bone, the only one of the inner joint is its hinge
         let missing = Error::MissingJoint { name: LIMBS[index].1[1] };
         let (twist, hinge) = of_joint(bones[0]).next_back().zip(of_joint(bones[1]).next()).ok_or(missing)?;
-        let free = [-std::f64::consts::PI, std::f64::consts::PI];
+        let free = [f64::NEG_INFINITY, f64::INFINITY];
+        let limits = |dof: &body::Dof| dof.limits.filter(|_| method.has_limits).unwrap_or(free);
         let limb = Limb::new(&Build {
             upper: inner - base,
             lower: end - inner,
             hinge: hinge.axis,
-            bend: hinge.limits.unwrap_or(free),
-            twist: twist.limits.unwrap_or(free),
-            upper_middle: middle(model, shape, bones[0], inner - base),
-            lower_middle: middle(model, shape, bones[1], end - inner),
+            bend: limits(hinge),
+            twist: limits(twist),
+            play: if method.has_limits { PLAY } else { f64::INFINITY },
+            half_width_m: method.width.inside_m,
+            upper_flesh: along(model, shape, bones[0], &(inner - base)),
+            lower_flesh: along(model, shape, bones[1], &(end - inner)),
         })?;
         let mut posture = vec![0.0; limb::DOFS];
         posture[limb::LOWER] = limbs.neutral_bend();
@@ -123,34 +129,8 @@ impl Tracked {
 
 /// An end effector farther than this from its target, metres, starts the limb anew: it ran into its limits.
 const LOST_M: f64 = 0.002;
-/// Shares of a bone at which the middle of the flesh is taken.
-const MIDDLES: [f64; 3] = [0.25, 0.5, 0.75];
-
-/// The middle of the flesh along a bone of the body at rest, from its joint, metres.
-fn middle(model: &BodyModel, shape: &Shape, joint: usize, bone: Vector3<f64>) -> Vec<Vector3<f64>> {
-    let at = |share: f64| {
-        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        for (vertex, position) in shape.vertices.iter().enumerate() {
-            let weight: f64 = model
-                .skin()
-                .influences(vertex)
-                .filter(|(of, _)| *of == joint)
-                .map(|(_, weight)| weight)
-                .sum();
-            let from_joint = position - shape.joints[joint];
-            let along = from_joint.dot(&bone) / bone.norm_squared();
-            if weight > 0.5 && (along - share).abs() < 0.1 {
-                let off_bone = from_joint - bone * along;
-                low = low.inf(&off_bone);
-                high = high.sup(&off_bone);
-            }
-        }
-        let off_bone = if low.x <= high.x { (low + high) * 0.5 } else { Vector3::zeros() };
-        bone * share + off_bone
-    };
-    MIDDLES.into_iter().map(at).collect()
-}
-
+/// How far elbows and knees give way about other axes than their hinge, radians.
+const PLAY: f64 = 0.02;
 /// Number of elbow positions, around the line from base to end, that the first frame is started from.
 const STARTS: u32 = 8;
 /// How much more another elbow must agree with the evidence.

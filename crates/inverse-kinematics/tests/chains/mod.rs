@@ -17,8 +17,10 @@ pub fn arm() -> Limb {
         hinge: -Vector3::x(),
         bend: [-0.2, 2.4],
         twist: [-0.5 * PI, 0.5 * PI],
-        upper_middle: Vec::new(),
-        lower_middle: Vec::new(),
+        play: 0.15,
+        half_width_m: 0.05,
+        upper_flesh: Vec::new(),
+        lower_flesh: Vec::new(),
     })
     .unwrap()
 }
