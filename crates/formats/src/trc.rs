@@ -9,7 +9,7 @@ use crate::{
     Error, Place, PointsOptions, Read, Result,
     points::{self, PointNames},
     read::Warnings,
-    text::{Line, Lines, finite, number, quote},
+    text::{Line, Lines, Names, finite, number, push_number, quote},
     time_grid::Times,
 };
 
@@ -54,6 +54,39 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
     let grid = rows.times.grid(header.rate, max_frames, &mut warnings)?;
     let trajectories = points::place(header.names, &rows.positions, &[], &grid)?;
     Ok(warnings.beside(trajectories))
+}
+
+/// Writes marker trajectories: millimetres, y up; frames count from 1, times start at 0, and cells of samples that were not
+/// measured are empty.
+pub fn write(name: &str, trajectories: &PointTrajectories) -> String {
+    let (rate, frames) = (trajectories.frame_rate(), trajectories.num_frames());
+    let points = trajectories.num_points();
+    let mut taken = Names::default();
+    let name = name.replace(['\t', '\n', '\r'], " ");
+    let mut out = format!(
+        "PathFileType\t4\t(X/Y/Z)\t{name}\n\
+         DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n\
+         {rate}\t{rate}\t{frames}\t{points}\tmm\t{rate}\t1\t{frames}\nFrame#\tTime"
+    );
+    for name in trajectories.names() {
+        out.push_str(&format!("\t{}\t\t", taken.unique_word(name, &[])));
+    }
+    out.push_str("\n\t");
+    for point in 1..=points {
+        out.push_str(&format!("\tX{point}\tY{point}\tZ{point}"));
+    }
+    out.push_str("\n\n");
+    for frame in 0..frames {
+        out.push_str(&format!("{}\t{}", frame + 1, frame as f64 / rate));
+        for value in trajectories.frame(frame).iter().flatten() {
+            out.push('\t');
+            if value.is_finite() {
+                push_number(&mut out, 1e3 * value);
+            }
+        }
+        out.push('\n');
+    }
+    out
 }
 
 /// The rows read so far.

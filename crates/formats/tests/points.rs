@@ -270,3 +270,45 @@ fn short_rows_under_many_names_do_not_fill_memory() {
     let error = trc::read(text.as_bytes(), &PointsOptions::default()).unwrap_err().to_string();
     assert!(error.contains("rows with a cell for each coordinate"), "{error}");
 }
+
+#[test]
+fn points_written_as_trc_and_c3d_are_read_back() {
+    let at = |frame: usize, point: usize| {
+        if (frame + point) % 5 == 4 {
+            nalgebra::Vector3::repeat(f64::NAN)
+        } else {
+            nalgebra::Vector3::new(frame as f64 * 0.01 - 0.3, 1.0 + point as f64 * 0.125, 0.5)
+        }
+    };
+    let names: Vec<String> = (0..7).map(|point| format!("joint_{point}")).collect();
+    let positions = (0..40).flat_map(|frame| (0..7).map(move |point| at(frame, point))).collect();
+    let written = PointTrajectories::new(names, 30.0, positions).unwrap();
+    let options = PointsOptions::default();
+    let text = trc::write("joints.trc", &written);
+    let bytes = formats::c3d::write(&written);
+    for read in [trc::read(text.as_bytes(), &options).unwrap(), formats::c3d::read(&bytes, &options).unwrap()]
+    {
+        assert!(read.warnings.is_empty(), "{:?}", read.warnings);
+        let read = read.value;
+        assert_eq!((read.names(), read.frame_rate()), (written.names(), 30.0));
+        assert_eq!((read.num_frames(), missing(&read)), (40, missing(&written)));
+        for frame in 0..40 {
+            for (a, b) in read.frame(frame).iter().zip(written.frame(frame)) {
+                assert!(a.x.is_nan() || (a - b).norm() < 1e-6, "frame {frame}: {a:?} {b:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn long_recordings_and_many_points_fit_into_c3d() {
+    let names: Vec<String> = (0..300).map(|point| format!("p{point}")).collect();
+    let many =
+        PointTrajectories::new(names, 100.0, vec![nalgebra::Vector3::new(1.0, 2.0, 3.0); 600]).unwrap();
+    let read = formats::c3d::read(&formats::c3d::write(&many), &PointsOptions::default()).unwrap().value;
+    assert_eq!(read.names(), many.names());
+    let one = vec![nalgebra::Vector3::new(1.0, 2.0, 3.0); 70_000];
+    let long = PointTrajectories::new(vec!["p".into()], 100.0, one).unwrap();
+    let read = formats::c3d::read(&formats::c3d::write(&long), &PointsOptions::default()).unwrap().value;
+    assert_eq!(read.num_frames(), 70_000);
+}

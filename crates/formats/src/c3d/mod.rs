@@ -4,6 +4,7 @@ mod bytes;
 mod frames;
 mod header;
 mod parameters;
+mod write;
 
 use model::{Axis, PointTrajectories};
 
@@ -11,6 +12,8 @@ use crate::{
     Error, Place, PointsOptions, Read, Result, error::at_byte, points, points::PointNames, read::Warnings,
     text::quote,
 };
+pub use write::write;
+
 use header::Header;
 use parameters::Parameters;
 
