@@ -15,7 +15,7 @@ use crate::{
     place::{Place, locate},
     solver::{Problem, Stage, State},
     start_poses::limb_dofs,
-    starts::find_starts,
+    starts::{Setting, Start, find_starts, sizes},
 };
 
 /// Starts that are fitted coarsely.
@@ -97,7 +97,7 @@ pub fn fit_frames(
     }
     let mut found = Vec::new();
     for frame in &observed {
-        found.push(frame.search(model, &topology, options));
+        found.push(frame.search(model, &topology, Wanted::All, options));
     }
     if found.is_empty() {
         return Err(Error::Nobody);
@@ -116,6 +116,61 @@ pub fn fit_frames(
             frame.result(model, &topology, (pose, &state.alpha), found.runner_up, options)
         })
         .collect()
+}
+
+/// Finds the pose of a person whose shape is known: [`fit`] with the shape (coefficients, standard deviations; missing ones
+/// are 0) held.
+///
+/// # Errors
+/// As [`fit`], and [`Error::Model`] if the shape is none of the model.
+pub fn fit_pose(
+    model: &BodyModel,
+    alpha: &[f64],
+    views: &[(Camera, Silhouette)],
+    options: &Options,
+) -> Result<Fit> {
+    check_model(model)?;
+    let components = model.num_components();
+    if alpha.len() > components || alpha.iter().any(|x| !x.is_finite()) {
+        return Err(Error::Model {
+            found: format!("{components} components and a shape of {} coefficients", alpha.len()),
+            expected: "a shape of at most as many, all finite".into(),
+        });
+    }
+    let mut known = alpha.to_vec();
+    known.resize(components, 0.0);
+    let topology = Topology::new(model.faces(), model.num_vertices());
+    let frame = Frame::new(views, options)?;
+    let wanted = Wanted::Pose(&known);
+    let found = frame.search(model, &topology, wanted, options);
+    let problem = Problem { model, topology: &topology, frames: vec![frame.kept()], options: *options };
+    let (state, _) = problem.solve(found.state, &wanted.stages(&FINE));
+    frame.result(model, &topology, (&state.poses[0], &state.alpha), found.runner_up, options)
+}
+
+/// What is to be found.
+#[derive(Clone, Copy)]
+enum Wanted<'a> {
+    /// pose and shape
+    All,
+    /// the pose of a body of these coefficients, shape `[components]`
+    Pose(&'a [f64]),
+}
+
+impl Wanted<'_> {
+    /// Stages in which nothing moves but what is wanted.
+    fn stages(self, stages: &[Stage]) -> Vec<Stage> {
+        let components = |stage: &Stage| if matches!(self, Self::All) { stage.components } else { 0 };
+        stages.iter().map(|stage| Stage { components: components(stage), ..*stage }).collect()
+    }
+
+    /// Shapes that starts are tried with.
+    fn alphas(self, model: &BodyModel) -> Vec<Vec<f64>> {
+        match self {
+            Self::All => sizes(model),
+            Self::Pose(alpha) => vec![alpha.to_vec()],
+        }
+    }
 }
 
 fn check_model(model: &BodyModel) -> Result<()> {
@@ -167,24 +222,26 @@ impl Frame {
     }
 
     /// The best of several starts.
-    fn search(&self, model: &BodyModel, topology: &Topology, options: &Options) -> Found {
-        let views = self.kept();
-        let mut starts = find_starts(model, topology, &views, self.place.centroid);
+    fn search(&self, model: &BodyModel, topology: &Topology, wanted: Wanted<'_>, options: &Options) -> Found {
+        let kept = self.kept();
+        let [coarse_stages, middle_stages] = [wanted.stages(&COARSE), wanted.stages(&MIDDLE)];
+        let alphas = wanted.alphas(model);
+        let setting = Setting { model, topology, views: &kept, centre: self.place.centroid, alphas: &alphas };
+        let mut starts = find_starts(&setting);
         starts.truncate(FITTED);
-        let problem = Problem { model, topology, frames: vec![views], options: *options };
-        let from = |start: &crate::starts::Start| {
-            let mut alpha = vec![0.0; model.num_components()];
-            alpha.iter_mut().take(1).for_each(|size| *size = start.size);
-            problem.solve(State { poses: vec![start.pose.clone()], alpha }, &COARSE)
+        let problem = Problem { model, topology, frames: vec![kept.clone()], options: *options };
+        let from = |start: &Start| {
+            let state = State { poses: vec![start.pose.clone()], alpha: start.alpha.clone() };
+            problem.solve(state, &coarse_stages)
         };
         let mut coarse: Vec<(State, f64)> = starts.par_iter().map(from).collect();
         coarse.sort_by(|a, b| a.1.total_cmp(&b.1));
         let twin = coarse.first().map(|(best, _)| twin(model, best));
         coarse.truncate(CONTENDERS);
         let mut contenders: Vec<State> = coarse.into_iter().map(|(state, _)| state).collect();
-        contenders.extend(twin.map(|twin| problem.solve(twin, &COARSE[1..]).0));
+        contenders.extend(twin.map(|twin| problem.solve(twin, &coarse_stages[1..]).0));
         let mut refined: Vec<(State, f64)> =
-            contenders.into_par_iter().map(|state| problem.solve(state, &MIDDLE)).collect();
+            contenders.into_par_iter().map(|state| problem.solve(state, &middle_stages)).collect();
         refined.sort_by(|a, b| a.1.total_cmp(&b.1));
         let (state, energy) = refined.swap_remove(0);
         let others = refined.iter().filter(|(other, _)| faces_elsewhere(&state, other));

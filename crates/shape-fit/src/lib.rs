@@ -4,7 +4,7 @@
 //! [`fit`] cleans the silhouettes, carves a coarse visual hull that tells where the person is and whether the views fit
 //! together, tries many start poses at low resolution, and minimises the distance between the rim of the projected model
 //! and the contours of the images, both ways, over pose and shape together. [`fit_frames`] does so for several frames of
-//! one person, who has one shape and a pose a frame. The method and what it was measured to do are in `docs/shape.md`.
+//! one person, who has one shape and a pose a frame; [`fit_pose`] finds the pose of a person whose shape is known. The method and what it was measured to do are in `docs/shape.md`.
 //!
 //! Metres, radians, y up. The person should stand about upright.
 
@@ -26,7 +26,7 @@ mod starts;
 pub use cleaning::cleaned;
 pub use contour_term::{PosedBody, Quadratic, Scratch, Term, Weighting};
 pub use error::Error;
-pub use fit::{Fit, ViewFit, fit, fit_frames};
+pub use fit::{Fit, ViewFit, fit, fit_frames, fit_pose};
 pub use observation::{Level, Observation, Outline};
 pub use options::Options;
 pub use overlay::draw_outline;

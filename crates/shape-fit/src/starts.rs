@@ -24,13 +24,34 @@ const ROUNDS: usize = 2;
 /// First coefficient of the shape, mostly stature, standard deviations.
 const SIZES: [f64; 5] = [0.0, -2.0, -1.0, 1.0, 2.0];
 
+/// Shapes to try where the shape is not known: coefficients, standard deviations, shape `[shapes][components]`.
+pub fn sizes(model: &BodyModel) -> Vec<Vec<f64>> {
+    let of_size = |&size: &f64| {
+        let mut alpha = vec![0.0; model.num_components()];
+        alpha.iter_mut().take(1).for_each(|first| *first = size);
+        alpha
+    };
+    SIZES.iter().map(of_size).collect()
+}
+
+/// What starts are searched in.
+pub struct Setting<'a> {
+    pub model: &'a BodyModel,
+    pub topology: &'a Topology,
+    pub views: &'a [&'a Observation],
+    /// centre of the hull's volume, metres
+    pub centre: Vector3<f64>,
+    /// shapes to try, shape `[shapes][components]`
+    pub alphas: &'a [Vec<f64>],
+}
+
 /// A pose to start from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     /// shape `[dofs]`
     pub pose: Vec<f64>,
-    /// the first coefficient of the shape; the others are 0
-    pub size: f64,
+    /// one of the shapes tried, shape `[components]`
+    pub alpha: Vec<f64>,
     /// mean distance between silhouettes, as a share of their height
     pub score: f64,
 }
@@ -45,13 +66,8 @@ struct Choice {
 }
 
 /// The best start of each of the best headings, the best first.
-pub fn find_starts(
-    model: &BodyModel,
-    topology: &Topology,
-    views: &[&Observation],
-    centre: Vector3<f64>,
-) -> Vec<Start> {
-    let scorer = || Scorer::new(model, topology, views, centre);
+pub fn find_starts(setting: &Setting<'_>) -> Vec<Start> {
+    let scorer = || Scorer::new(setting);
     let whole = |heading: usize| {
         WHOLE.map(|[arms, legs]| Choice { heading, size: 0, limbs: [arms, arms, legs, legs] })
     };
@@ -65,8 +81,7 @@ pub fn find_starts(
         .into_par_iter()
         .map_init(scorer, |scorer, found| {
             let (score, choice) = by_limbs(scorer, found);
-            let (pose, size) = (scorer.place(choice), SIZES[choice.size]);
-            Start { pose, size, score }
+            Start { pose: scorer.place(choice), alpha: setting.alphas[choice.size].clone(), score }
         })
         .collect();
     starts.sort_by(|a, b| a.score.total_cmp(&b.score));
@@ -81,7 +96,7 @@ fn best(scorer: &mut Scorer<'_>, choices: &[Choice]) -> (f64, Choice) {
 fn by_limbs(scorer: &mut Scorer<'_>, mut found: (f64, Choice)) -> (f64, Choice) {
     for _ in 0..ROUNDS {
         let before = found.0;
-        for size in 0..SIZES.len() {
+        for size in 0..scorer.shapes.len() {
             found = better(scorer, found, Choice { size, ..found.1 });
         }
         // legs carry more of the outline than arms do
@@ -106,11 +121,8 @@ fn better(scorer: &mut Scorer<'_>, found: (f64, Choice), choice: Choice) -> (f64
 
 /// Draws starts; keeps its buffers.
 struct Scorer<'a> {
-    model: &'a BodyModel,
-    topology: &'a Topology,
-    views: &'a [&'a Observation],
-    centre: Vector3<f64>,
-    /// of every size
+    setting: &'a Setting<'a>,
+    /// those of the setting
     shapes: Vec<Shape>,
     limbs: [[Option<usize>; 4]; 4],
     posed: Posed,
@@ -120,24 +132,15 @@ struct Scorer<'a> {
 }
 
 impl<'a> Scorer<'a> {
-    fn new(
-        model: &'a BodyModel,
-        topology: &'a Topology,
-        views: &'a [&'a Observation],
-        centre: Vector3<f64>,
-    ) -> Self {
-        let shapes =
-            SIZES.iter().map(|&size| model.shape(&[size][..model.num_components().min(1)])).collect();
+    fn new(setting: &'a Setting<'a>) -> Self {
+        let Setting { model, views, alphas, .. } = setting;
         let empty = |view: &&Observation| {
             let [width, height] = view.scoring.0.size;
             Silhouette::empty(width, height)
         };
         Self {
-            model,
-            topology,
-            views,
-            centre,
-            shapes,
+            setting,
+            shapes: alphas.iter().map(|alpha| model.shape(alpha)).collect(),
             limbs: limb_dofs(model),
             posed: Posed::default(),
             rasteriser: Rasteriser::new(),
@@ -148,16 +151,17 @@ impl<'a> Scorer<'a> {
 
     /// The pose of a choice, its volume's centre where the hull's is; leaves the posed body.
     fn place(&mut self, choice: Choice) -> Vec<f64> {
-        let mut pose = vec![0.0; self.model.rig().num_dofs()];
+        let Setting { model, centre, .. } = self.setting;
+        let mut pose = vec![0.0; model.rig().num_dofs()];
         for (limb, &chosen) in choice.limbs.iter().enumerate() {
             let degrees = if limb < 2 { &ARMS[chosen] } else { &LEGS[chosen] };
             set_limb(&mut pose, &self.limbs[limb], degrees);
         }
-        self.model.rig().clamp(&mut pose);
+        model.rig().clamp(&mut pose);
         let turn = TAU * choice.heading as f64 / HEADINGS as f64;
         pose[4] = if turn > TAU / 2.0 { turn - TAU } else { turn };
-        self.shapes[choice.size].pose(self.model, &pose, &mut self.posed);
-        let shift = self.centre - centroid(&self.posed.vertices, self.model.faces());
+        self.shapes[choice.size].pose(model, &pose, &mut self.posed);
+        let shift = centre - centroid(&self.posed.vertices, model.faces());
         pose[..3].copy_from_slice(shift.as_slice());
         self.posed.vertices.iter_mut().for_each(|vertex| *vertex += shift);
         pose
@@ -166,12 +170,13 @@ impl<'a> Scorer<'a> {
     fn score(&mut self, choice: Choice) -> f64 {
         self.place(choice);
         let mut sum = 0.0;
-        for (view, drawn) in self.views.iter().zip(&mut self.drawn) {
+        let Setting { topology, views, .. } = self.setting;
+        for (view, drawn) in views.iter().zip(&mut self.drawn) {
             let (view, observed) = &view.scoring;
-            let bounds = self.rasteriser.silhouette(view, &self.posed.vertices, self.topology, drawn);
+            let bounds = self.rasteriser.silhouette(view, &self.posed.vertices, topology, drawn);
             let height = observed.silhouette().bounds().map_or(1, |[_, top, _, bottom]| bottom - top);
             sum += self.chamfer.difference(drawn, bounds, observed).symmetric_px() / height as f64;
         }
-        sum / self.views.len().max(1) as f64
+        sum / views.len().max(1) as f64
     }
 }

@@ -10,7 +10,7 @@ use evaluation::{Body, ShapeErrors, shape_errors};
 use formats::{calibration, image_files};
 use model::{Camera, Mesh, Silhouette};
 use nalgebra::Vector3;
-use shape_fit::{Fit, Options, fit, fit_frames};
+use shape_fit::{Fit, Options, fit, fit_frames, fit_pose};
 use vision::scene::{Ring, SilhouetteNoise, silhouettes};
 
 fn named(model: &BodyModel, joints: &[Vector3<f64>]) -> Vec<(String, Vector3<f64>)> {
@@ -167,4 +167,27 @@ fn the_number_of_threads_changes_no_bit() {
         pool.install(|| fit(&model, &views, &Options::default()).unwrap())
     };
     assert_eq!(with(1), with(3));
+}
+
+#[test]
+fn the_pose_of_a_known_body_is_found_and_the_shape_stays() {
+    let model = BodyModel::shipped();
+    let alpha = [1.2, -0.8, 0.5];
+    let shape = model.shape(&alpha);
+    let mut pose = vec![0.0; model.rig().num_dofs()];
+    let dof = |name: &str| model.rig().dof_index(name).unwrap();
+    (pose[0], pose[2], pose[4]) = (0.3, -0.2, 2.0);
+    (pose[dof("l_shoulder_abd")], pose[dof("r_elbow")]) = (0.9, 1.2);
+    let mut posed = Posed::default();
+    shape.pose(&model, &pose, &mut posed);
+    let mesh = Mesh::new(posed.vertices.clone(), model.faces().to_vec()).unwrap();
+    let cameras = Ring { cameras: 4, size: 502, focal: 663.0, ..Ring::default() }.cameras();
+    let views = seen(&mesh, &cameras);
+    let found = fit_pose(&model, &alpha, &views, &Options::default()).unwrap();
+    assert_eq!(found.alpha[..3], alpha);
+    assert!(found.alpha[3..].iter().all(|x| *x == 0.0));
+    let worst = found.joints.iter().zip(&posed.joints).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(worst < 0.03, "{worst} m");
+    let none = fit_pose(&model, &[f64::NAN], &views, &Options::default()).unwrap_err();
+    assert!(none.to_string().contains("coefficients"), "{none}");
 }
