@@ -40,6 +40,22 @@ impl Limb {
         Self::RightLowerLeg,
     ];
 
+    /// As people call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Torso => "torso",
+            Self::Head => "head",
+            Self::LeftUpperArm => "left upper arm",
+            Self::LeftLowerArm => "left lower arm",
+            Self::RightUpperArm => "right upper arm",
+            Self::RightLowerArm => "right lower arm",
+            Self::LeftUpperLeg => "left upper leg",
+            Self::LeftLowerLeg => "left lower leg",
+            Self::RightUpperLeg => "right upper leg",
+            Self::RightLowerLeg => "right lower leg",
+        }
+    }
+
     /// The limb that this one hangs from.
     pub fn parent(self) -> Option<Self> {
         match self {

@@ -60,6 +60,12 @@ pub enum Error {
         /// where the chunk before it ends
         expected: usize,
     },
+    /// Bytes that are no file of what was tracked.
+    #[error("not a file of tracked frames: {found}")]
+    File {
+        /// what is wrong with it
+        found: String,
+    },
     /// Who called wanted no more.
     #[error("stopped in frame {frame}")]
     Stopped {

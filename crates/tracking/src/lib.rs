@@ -9,7 +9,9 @@
 //! Metres, radians, y up. Results depend on the seed and on what was seen, not on the number of threads.
 
 mod chunk;
+mod chunk_file;
 mod error;
+mod follow;
 mod joint_limit_term;
 mod lift;
 mod local;
@@ -28,6 +30,7 @@ mod training_poses;
 
 pub use chunk::{Chunk, ChunkPlan, Merged, Seam, merge, plan_chunks, track_chunk, track_frames};
 pub use error::Error;
+pub use follow::{Footage, follow, hold_unseen};
 pub use joint_limit_term::joint_limit_energy;
 pub use misalignment::{LimbError, Misalignment};
 pub use observed_frame::ObservedFrame;

@@ -136,6 +136,11 @@ impl<'a> Tracker<'a> {
         Ok(())
     }
 
+    /// The pose of the last frame, shape `[dofs]`.
+    pub fn pose(&self) -> &[f64] {
+        &self.last
+    }
+
     /// The model.
     pub fn model(&self) -> &'a BodyModel {
         self.model

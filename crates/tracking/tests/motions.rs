@@ -7,8 +7,12 @@ mod scans;
 use std::sync::atomic::AtomicBool;
 
 use body::BodyModel;
+use model::{Camera, Silhouette};
 use moving::{cameras, distances, mixed, seen};
-use tracking::{Chunk, Error, ObservedFrame, Options, Stage, Tracker, merge, plan_chunks, track_chunk};
+use tracking::{
+    Chunk, Error, Footage, ObservedFrame, Options, Stage, Tracker, follow, hold_unseen, merge, plan_chunks,
+    track_chunk,
+};
 use vision::scene::SilhouetteNoise;
 
 static GO: AtomicBool = AtomicBool::new(false);
@@ -138,4 +142,66 @@ fn a_stop_is_heard_inside_a_frame_and_an_empty_frame_keeps_the_pose() {
     let unseen = tracker.track(&ObservedFrame::new(8, &nobody).unwrap(), &GO).unwrap();
     assert_eq!((unseen.stage, unseen.ious, unseen.pose), (Stage::Unseen, vec![None; 3], tracked.pose));
     assert!(Tracker::new(&model, &[], &[0.0; 3], Options::default()).is_err());
+}
+
+#[test]
+fn a_person_who_comes_late_and_leaves_is_followed_from_where_they_are_found() {
+    let model = BodyModel::shipped();
+    let shape = model.shape(&[0.5, -0.5]);
+    let cameras = cameras(4);
+    let motion = &mixed(&model, 6)[..16];
+    let empty = |views: &moving::Views| -> moving::Views {
+        views.iter().map(|(c, s)| (c.clone(), Silhouette::empty(s.width(), s.height()))).collect()
+    };
+    let frames: Vec<_> = motion.iter().map(|pose| seen(&model, &shape, pose, &cameras)).collect();
+    // nobody in the first two frames and in two later ones; the first try to find somebody fails
+    let is_empty = |frame: usize| frame < 2 || frame == 11 || frame == 12;
+    let mut tries = 0;
+    let footage = Footage {
+        frames: 0..motion.len(),
+        views: |frame: usize| {
+            let (views, _) = &frames[frame];
+            Ok::<_, Error>(if is_empty(frame) { empty(views) } else { views.clone() })
+        },
+        find: |views: &[(Camera, Silhouette)]| {
+            tries += 1;
+            let fit = || shape_fit::fit_pose(&model, &shape.alpha, views, &shape_fit::Options::default());
+            (tries > 1).then(fit).and_then(Result::ok).map(|fit| fit.pose)
+        },
+    };
+    let rest = vec![0.0; model.rig().num_dofs()];
+    let mut tracker = Tracker::new(&model, &shape.alpha, &rest, Options::default()).unwrap();
+    let mut done = Vec::new();
+    let mut chunk = follow(&mut tracker, footage, &GO, |frames| done.push(frames)).unwrap();
+    assert!(done.iter().copied().eq(0..=motion.len()));
+    assert!(chunk.frames.iter().map(|tracked| tracked.frame).eq(0..motion.len()));
+    assert_eq!(hold_unseen(&model, &shape, &mut chunk.frames), 4);
+    for (frame, tracked) in chunk.frames.iter().enumerate() {
+        assert_eq!(tracked.stage == Stage::Unseen, is_empty(frame), "frame {frame}");
+        let of = if frame < 2 {
+            2
+        } else if is_empty(frame) {
+            10
+        } else {
+            frame
+        };
+        let worst = distances(&tracked.joints, &frames[of].1).fold(0.0, f64::max);
+        assert!(worst < 0.06, "frame {frame}: {worst} m");
+    }
+}
+
+#[test]
+fn following_stops_when_it_is_told_to() {
+    let model = BodyModel::shipped();
+    let shape = model.shape(&[]);
+    let pose = moving::pose(&model, 0.0, [0, 0, 0, 0]);
+    let (views, _) = seen(&model, &shape, &pose, &cameras(2));
+    let footage = Footage {
+        frames: 3..9,
+        views: |_| Ok::<_, Error>(views.clone()),
+        find: |_: &[(Camera, Silhouette)]| Some(pose.clone()),
+    };
+    let mut tracker = Tracker::new(&model, &[], &pose, Options::default()).unwrap();
+    let stopped = follow(&mut tracker, footage, &AtomicBool::new(true), |_| ());
+    assert_eq!(stopped, Err(Error::Stopped { frame: 3 }));
 }
