@@ -4,11 +4,12 @@ use prost::Message;
 use std::{error::Error, path::PathBuf};
 
 const ROOT: &str = "../../proto";
-const FILES: [&str; 5] = [
+const FILES: [&str; 6] = [
     "marey/v1/geometry.proto",
     "marey/v1/live.proto",
     "marey/v1/motion_index.proto",
     "marey/v1/reconstruction.proto",
+    "marey/v1/refinement.proto",
     "marey/v1/shape_init.proto",
 ];
 

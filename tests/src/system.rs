@@ -114,6 +114,15 @@ impl System {
         Ok(())
     }
 
+    /// A gateway, one shape-init and one refinement of so many jobs at once, in this process.
+    pub fn with_cameras(workers: usize) -> anyhow::Result<Self> {
+        let mut system = Self::with_shape_init(workers)?;
+        let (config, shutdown) = (system.service_config(workers), system.shutdown.clone());
+        let service = system.runtime()?.block_on(refinement::start(config, shutdown))?;
+        system.services.push(service);
+        Ok(system)
+    }
+
     fn service_config(&self, workers: usize) -> service::Config {
         let mut config =
             service::Config::new(self.database.url(), Location::folder(self.store.path()), any_port());

@@ -12,8 +12,8 @@ pub struct Parameters {
     pub num_frames: Option<usize>,
     /// frames that pose and shape are found from, together: more sharpen the shape
     pub shape_frames: usize,
-    /// frames from one of these to the next
-    pub shape_step: usize,
+    /// frames from one of these to the next; `None`: spread over the session
+    pub shape_step: Option<usize>,
     /// videos whose longer side has more pixels are read smaller
     pub largest_side: u32,
     /// a view that disagrees with all others is left out, rather than ending the run
@@ -52,7 +52,7 @@ impl Default for Parameters {
             first_frame: 0,
             num_frames: None,
             shape_frames: 1,
-            shape_step: 10,
+            shape_step: None,
             largest_side: 2048,
             leave_out_bad_view: true,
             least_overlap: 0.72,
@@ -82,7 +82,7 @@ impl Parameters {
             ("first_frame", self.first_frame, 0..=10_000_000, "0 to 10000000"),
             ("num_frames", self.num_frames.unwrap_or(1), 1..=10_000_000, "1 to 10000000"),
             ("shape_frames", self.shape_frames, 1..=16, "1 to 16"),
-            ("shape_step", self.shape_step, 1..=10_000, "1 to 10000"),
+            ("shape_step", self.shape_step.unwrap_or(1), 1..=10_000, "1 to 10000"),
             ("largest_side", self.largest_side as usize, 64..=8192, "64 to 8192 pixels"),
             ("chunk_frames", self.chunk_frames, 5..=3000, "5 to 3000"),
             ("overlap_frames", self.overlap_frames, 0..=300, "0 to 300"),
@@ -127,8 +127,10 @@ impl Parameters {
 
     /// The frames that pose and shape are found from, at most those before `end`.
     pub fn frames_of_shape(&self, end: usize) -> Vec<usize> {
+        let spread = end.saturating_sub(self.first_frame) / self.shape_frames;
+        let step = self.shape_step.unwrap_or(spread).max(1);
         (0..self.shape_frames)
-            .map(|index| self.first_frame + index * self.shape_step)
+            .map(|index| self.first_frame + index * step)
             .take_while(|&frame| frame < end)
             .collect()
     }
@@ -143,13 +145,24 @@ mod tests {
         Parameters::default().check().unwrap();
         let bad = Parameters { shape_frames: 0, ..Parameters::default() };
         assert_eq!(bad.check().unwrap_err().to_string(), "shape_frames is 0, expected 1 to 16");
+        let bad = Parameters { overlap_frames: 150, ..Parameters::default() };
+        assert_eq!(
+            bad.check().unwrap_err().to_string(),
+            "overlap_frames is 150, expected less than chunk_frames"
+        );
+        assert!(Parameters { particles: 1, ..Parameters::default() }.check().is_err());
+        Parameters { particles: 0, ..Parameters::default() }.check().unwrap();
+        assert!(Parameters { frame_rate: Some(0.0), ..Parameters::default() }.check().is_err());
         let bad = Parameters { hull_voxel_m: f64::NAN, ..Parameters::default() };
         assert!(bad.check().is_err());
     }
 
     #[test]
     fn frames_of_the_shape_end_with_the_clip() {
-        let parameters = Parameters { first_frame: 5, shape_frames: 3, ..Parameters::default() };
+        let spread = Parameters { first_frame: 5, shape_frames: 3, ..Parameters::default() };
+        assert_eq!(spread.frames_of_shape(305), [5, 105, 205]);
+        assert_eq!(spread.frames_of_shape(7), [5, 6]);
+        let parameters = Parameters { shape_step: Some(10), ..spread };
         assert_eq!(parameters.frames_of_shape(100), [5, 15, 25]);
         assert_eq!(parameters.frames_of_shape(16), [5, 15]);
     }

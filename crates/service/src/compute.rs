@@ -1,5 +1,10 @@
 //! Computation away from the async threads.
 
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
+
 use tokio::{sync::Semaphore, task::JoinError};
 
 /// Runs `work` on a thread that may block, and waits for it. A panic in it goes on here, where the worker loop or
@@ -30,5 +35,27 @@ impl Slots {
         // A failure to get a slot would mean that the semaphore was closed, which nobody does.
         let _slot = self.0.acquire().await;
         run(work).await
+    }
+}
+
+/// A flag for a thread that computes, raised when this goes away: whatever ends a job or a call ends the work for it.
+#[derive(Debug, Default)]
+pub struct StopOnDrop(Arc<AtomicBool>);
+
+impl StopOnDrop {
+    /// For the thread.
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        self.0.clone()
+    }
+
+    /// Raises the flag now.
+    pub fn stop(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        self.stop();
     }
 }

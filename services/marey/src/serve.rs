@@ -21,11 +21,16 @@ pub enum Service {
     /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50052), MAREY_WORKER_CONCURRENCY and others
     /// may be.
     Reconstruction,
-    /// Learns body models, makes silhouettes, finds pose and shape in them
+    /// Learns body models, makes silhouettes, finds pose and shape in them, draws what was found over videos
     ///
     /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50053), MAREY_WORKER_CONCURRENCY and others
     /// may be. Videos need the program ffmpeg and room for a copy in TMPDIR.
     ShapeInit,
+    /// Follows people through the frames of sessions with cameras
+    ///
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50054), MAREY_WORKER_CONCURRENCY and others
+    /// may be.
+    Refinement,
 }
 
 /// Runs `marey serve` until SIGTERM or SIGINT.
@@ -50,6 +55,10 @@ pub fn run(which: &Service) -> anyhow::Result<()> {
             Service::ShapeInit => {
                 let config = service::Config::from_variables(&variables, shape_init::DEFAULT_LISTEN)?;
                 Ok(shape_init::run(config, shutdown).await?)
+            }
+            Service::Refinement => {
+                let config = service::Config::from_variables(&variables, refinement::DEFAULT_LISTEN)?;
+                Ok(refinement::run(config, shutdown).await?)
             }
         }
     })

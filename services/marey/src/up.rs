@@ -87,7 +87,7 @@ pub struct Everything {
     pub cluster_dir: PathBuf,
     cluster: PrivateCluster,
     gateway: Gateway,
-    services: [service::Running; 3],
+    services: [service::Running; 4],
 }
 
 impl Everything {
@@ -123,24 +123,26 @@ impl Everything {
     /// # Errors
     /// Of the part that failed.
     pub async fn until_stopped(self, shutdown: CancellationToken) -> anyhow::Result<()> {
-        let [motion_index, reconstruction, shape_init] = self.services;
+        let [motion_index, reconstruction, shape_init, refinement] = self.services;
         let gateway = async { self.gateway.stopped().await.context("gateway") };
         let motion_index = async { motion_index.stopped().await.context("motion-index") };
         let reconstruction = async { reconstruction.stopped().await.context("reconstruction") };
         let shape_init = async { shape_init.stopped().await.context("shape-init") };
+        let refinement = async { refinement.stopped().await.context("refinement") };
         // whichever ends takes the others with it
         let ended = |result: anyhow::Result<()>| {
             shutdown.cancel();
             result
         };
-        let (a, b, c, d) = tokio::join!(
+        let (a, b, c, d, e) = tokio::join!(
             async { ended(gateway.await) },
             async { ended(motion_index.await) },
             async { ended(reconstruction.await) },
             async { ended(shape_init.await) },
+            async { ended(refinement.await) },
         );
         stop(self.cluster).await?;
-        a.and(b).and(c).and(d)
+        a.and(b).and(c).and(d).and(e)
     }
 }
 
@@ -149,7 +151,7 @@ async fn start_services(
     data_dir: &Path,
     cluster: &PrivateCluster,
     shutdown: CancellationToken,
-) -> anyhow::Result<(Server, Gateway, [service::Running; 3])> {
+) -> anyhow::Result<(Server, Gateway, [service::Running; 4])> {
     cluster.create_database("marey").await?;
     let database_url = cluster.url("marey");
     let store = Location::folder(data_dir.join("objects"));
@@ -168,12 +170,13 @@ async fn start_services(
     let reconstruction = reconstruction::start(config.clone(), shutdown.clone()).await?;
     replicas.set(reconstruction.address);
     let shape_init = shape_init::start(config.clone(), shutdown.clone()).await?;
+    let refinement = refinement::start(config.clone(), shutdown.clone()).await?;
     let motion_index = motion_index::start(config, shutdown).await?;
 
     let server =
         Server { url: format!("http://{}", gateway.address()), api_key, database_url: Some(database_url) };
     server.write(data_dir)?;
-    Ok((server, gateway, [motion_index, reconstruction, shape_init]))
+    Ok((server, gateway, [motion_index, reconstruction, shape_init, refinement]))
 }
 
 /// The key of earlier times, or a new one.

@@ -1,10 +1,9 @@
 //! Pose and shape from silhouettes, and what is drawn of them.
 
 use body::BodyModel;
-use model::{Camera, Image, Mesh, Silhouette};
+use model::{Camera, Silhouette};
 use multi_view::Parameters;
 use shape_fit::{Fit, Options};
-use vision::{Rasteriser, Topology, View};
 
 use crate::InputError;
 
@@ -16,29 +15,53 @@ pub(crate) struct Moment {
     pub views: Vec<(Camera, Silhouette)>,
 }
 
-/// Finds the shape of the person and a pose for every moment.
+/// Bodies of one shape in some moments.
+pub(crate) struct Found {
+    /// those in which somebody was found
+    pub moments: Vec<Moment>,
+    /// a fit for each of them
+    pub fits: Vec<Fit>,
+    /// why nobody was found in others
+    pub left_out: Vec<String>,
+}
+
+/// Finds the shape of the person and a pose for every moment. Where several are given, those in which nobody can be found by
+/// themselves are left out.
 ///
 /// # Errors
-/// What the person who recorded can do something about.
+/// What the person who recorded can do something about, if nobody is found in any.
 pub(crate) fn fit(
     model: &BodyModel,
-    moments: &[Moment],
+    moments: Vec<Moment>,
     parameters: &Parameters,
-) -> Result<Vec<Fit>, InputError> {
+) -> Result<Found, InputError> {
     let options = Options {
         least_iou: parameters.least_overlap,
         leave_out_bad_view: parameters.leave_out_bad_view,
         ..Options::default()
     };
-    let frames: Vec<&[(Camera, Silhouette)]> = moments.iter().map(|moment| moment.views.as_slice()).collect();
-    Ok(shape_fit::fit_frames(model, &frames, &options)?)
-}
-
-/// Draws the outline of a mesh, as a camera sees it, over what the camera saw.
-pub(crate) fn draw_over(picture: &mut Image, camera: &Camera, mesh: &Mesh, colour: [u8; 3]) {
-    let (width, height) = (picture.width(), picture.height());
-    let topology = Topology::new(&mesh.faces, mesh.vertices.len());
-    let mut silhouette = Silhouette::empty(width, height);
-    Rasteriser::new().silhouette(&View::new(camera), &mesh.vertices, &topology, &mut silhouette);
-    shape_fit::draw_outline(picture, &silhouette, colour);
+    let together = |moments: &[Moment]| {
+        let frames: Vec<&[(Camera, Silhouette)]> =
+            moments.iter().map(|moment| moment.views.as_slice()).collect();
+        shape_fit::fit_frames(model, &frames, &options)
+    };
+    match together(&moments) {
+        Ok(fits) => Ok(Found { moments, fits, left_out: Vec::new() }),
+        Err(error) if moments.len() < 2 => Err(error.into()),
+        Err(error) => {
+            let (mut kept, mut left_out) = (Vec::new(), Vec::new());
+            for moment in moments {
+                match shape_fit::fit(model, &moment.views, &options) {
+                    Ok(_) => kept.push(moment),
+                    Err(error) => {
+                        left_out.push(format!("frame {} is not used for the shape: {error}", moment.frame));
+                    }
+                }
+            }
+            if kept.is_empty() {
+                return Err(error.into());
+            }
+            Ok(Found { fits: together(&kept)?, moments: kept, left_out })
+        }
+    }
 }

@@ -3,17 +3,19 @@
 use std::{sync::Arc, time::Instant};
 
 use body::BodyModel;
-use camera_jobs::{CameraClips, Silhouettes, named, reports};
+use camera_jobs::{CameraClips, Silhouettes, TrackingSession, named, reports};
 use formats::image_files;
 use model::Image;
-use payloads::{CameraReport, MultiViewReport, file_part, picture_name};
+use multi_view::Parameters;
+use payloads::{CameraReport, MultiViewReport, Object, file_part, picture_name};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use shape_fit::Fit;
 
 use crate::{
-    INITIALISE_BODY, InputError, Shared,
-    fit::{self, Moment},
+    INITIALISE_BODY, InputError, Shared, children,
+    drawing::{Drawer, FITS},
+    fit::{self, Found, Moment},
     hull::hull,
     payload::InitialiseBody,
     results::{self, ResultFile},
@@ -24,11 +26,13 @@ use crate::{
 const RUN: &str = "run.json";
 /// Largest picture, bytes.
 const MAX_PICTURE_BYTES: u64 = 256 << 20;
-/// Colour of the outline of the body that was found.
-const OUTLINE: [u8; 3] = [0, 255, 120];
 /// Below this a user had better look.
 const LOW_CONFIDENCE: f64 = 0.5;
-/// Frames a second where no file tells, for the one pose in a BVH.
+/// Name of the artefact with all that the jobs after this one are given.
+const SESSION: &str = "tracking.json";
+/// Frames, spread over the session, in which a person is looked for who was not in the first.
+const LATER_TRIES: usize = 7;
+/// Frames a second where no file tells.
 const FRAME_RATE: f64 = 30.0;
 
 pub(crate) struct InitialiseHandler {
@@ -55,19 +59,23 @@ impl Handler for InitialiseHandler {
         let artefacts = resources.artefacts_before(&job).await?;
         let cameras = reports(resources, &artefacts).await?;
         warnings.extend(cameras.iter().flat_map(|camera| camera.warnings.iter().cloned()));
-        let moments = Arc::new(self.moments(&request.parameters, &cameras, &artefacts, &mut warnings).await?);
+        let clips: Result<Vec<_>, _> =
+            cameras.iter().map(|camera| CameraClips::new(camera, &artefacts)).collect();
+        let clips = clips?;
+        let end_frame = end_frame(&cameras, &mut warnings);
         let model = models.get(&request.body_model).await?;
         job.check()?;
-
         job.progress(0.1, "finding pose and shape");
-        let (of, parameters, on) = (moments.clone(), request.parameters.clone(), model.clone());
-        let fits = compute::run(move || fit::fit(&on, &of, &parameters)).await;
+        let parameters = &request.parameters;
+        let found = self.find(&job, &model, parameters, &clips, end_frame).await;
+        let found = found.map_err(|error| explained(error, &cameras))?;
         job.check()?;
-        let fits = Arc::new(fits.map_err(|error| explained(error, &cameras))?);
+        let Found { moments, fits, left_out } = found;
+        let (moments, fits) = (Arc::new(moments), Arc::new(fits));
+        warnings.extend(left_out);
         warnings.extend(doubts(&fits));
-
         job.progress(0.7, "carving the visual hull");
-        let (of, cell_m) = (moments.clone(), request.parameters.hull_voxel_m);
+        let (of, cell_m) = (moments.clone(), parameters.hull_voxel_m);
         let carved = compute::run(move || of.first().map(|first| hull(&first.views, cell_m))).await;
         job.check()?;
         let mut files = Vec::new();
@@ -78,8 +86,12 @@ impl Handler for InitialiseHandler {
             None => {}
         }
         job.progress(0.8, "writing the body");
-        let frame_rate = cameras.iter().find_map(|camera| camera.frame_rate).unwrap_or(FRAME_RATE);
+        let frame_rate = frame_rate(parameters, &cameras, &mut warnings);
         files.extend(self.body(&model, &moments, &fits, frame_rate, &warnings).await?);
+        if parameters.track {
+            // those of the whole motion come later
+            files.retain(|file| ![results::BODY, results::POSE].contains(&file.name.as_str()));
+        }
         let mut artefacts_of_results = Vec::new();
         for file in files {
             artefacts_of_results.push(self.write(&job, file).await?);
@@ -87,48 +99,87 @@ impl Handler for InitialiseHandler {
         for (index, camera) in cameras.iter().enumerate() {
             job.check()?;
             job.progress(0.85 + 0.14 * index as f64 / cameras.len() as f64, "drawing overlays");
-            if let Some(file) = self.overlay(camera, &artefacts, &moments, &fits).await? {
+            if let Some(file) = self.overlay(camera, &artefacts, &moments, (&model, &fits)).await? {
                 artefacts_of_results.push(self.write(&job, file).await?);
             }
         }
         let report = resources.job_report(&job, started, moments.len());
-        let report =
-            MultiViewReport::new(job.run_id().0, &request, (&plan, &report), &cameras, &warnings, None);
-        let content = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
-        let run = ResultFile { name: RUN.to_owned(), media_type: "application/json", content };
-        artefacts_of_results.push(self.write(&job, run).await?);
-        Ok(artefacts_of_results.into_iter().fold(Outcome::default(), Outcome::artefact))
+        let mut outcome = artefacts_of_results.into_iter().fold(Outcome::default(), Outcome::artefact);
+        if parameters.track {
+            let session = TrackingSession {
+                alpha: fits.first().map_or(Vec::new(), |fit| fit.alpha.clone()),
+                first_frame: parameters.first_frame,
+                plan,
+                initialise: report,
+                clips,
+                cameras,
+                end_frame,
+                frame_rate,
+                warnings,
+                request,
+            };
+            let content = serde_json::to_vec(&session).map_err(JobError::retry)?;
+            let artefact =
+                objects::write(&resources.store, &job, SESSION, "application/json", content).await?;
+            let object = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
+            outcome = outcome.artefact(artefact).children(children::of(&session, &object)?);
+        } else {
+            let report =
+                MultiViewReport::new(job.run_id().0, &request, (&plan, &report), &cameras, &warnings, None);
+            let content = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
+            let run = ResultFile { name: RUN.to_owned(), media_type: "application/json", content };
+            outcome = outcome.artefact(self.write(&job, run).await?);
+        }
+        Ok(outcome)
     }
 }
 
 impl InitialiseHandler {
-    /// The silhouettes of all cameras at the frames from which the shape is found.
-    async fn moments(
+    /// Pose and shape in the frames that were asked for. Where the person is to be followed and is not in these yet, they are
+    /// looked for in others.
+    async fn find(
         &self,
-        parameters: &multi_view::Parameters,
-        cameras: &[CameraReport],
-        artefacts: &[Artefact],
-        warnings: &mut Vec<String>,
-    ) -> Result<Vec<Moment>, JobError> {
-        let ends: Vec<usize> = cameras.iter().map(|camera| camera.end_frame).collect();
-        let (first_end, last_end) = (ends.iter().min().copied(), ends.iter().max().copied());
-        if let (Some(first), Some(last)) = (first_end, last_end)
-            && first < last
-        {
-            warnings.push(format!(
-                "cameras have {first} to {last} frames: only those that all have are used, and all are taken to begin at \
-                 the same moment"
-            ));
+        job: &JobContext,
+        model: &Arc<BodyModel>,
+        parameters: &Parameters,
+        clips: &[CameraClips],
+        end_frame: usize,
+    ) -> Result<Found, FindError> {
+        let wanted = parameters.frames_of_shape(end_frame);
+        let first = match self.find_in(model, parameters, clips, &wanted).await {
+            Err(FindError::Nobody(error)) if parameters.track => error,
+            found => return found,
+        };
+        let spread = Parameters { shape_frames: LATER_TRIES + 1, shape_step: None, ..parameters.clone() };
+        for frame in spread.frames_of_shape(end_frame).into_iter().filter(|frame| !wanted.contains(frame)) {
+            job.check()?;
+            match self.find_in(model, parameters, clips, &[frame]).await {
+                Err(FindError::Nobody(_)) => {}
+                Err(error) => return Err(error),
+                Ok(mut found) => {
+                    found.left_out.push(format!("the shape is that of frame {frame}, as before: {first}"));
+                    return Ok(found);
+                }
+            }
         }
-        let clips: Result<Vec<_>, _> =
-            cameras.iter().map(|camera| CameraClips::new(camera, artefacts)).collect();
-        let clips = clips?;
+        Err(FindError::Nobody(first))
+    }
+
+    async fn find_in(
+        &self,
+        model: &Arc<BodyModel>,
+        parameters: &Parameters,
+        clips: &[CameraClips],
+        frames: &[usize],
+    ) -> Result<Found, FindError> {
         let mut moments = Vec::new();
-        for frame in parameters.frames_of_shape(first_end.unwrap_or(0)) {
-            let silhouettes = Silhouettes::read(&self.shared.resources, &clips, frame..frame + 1).await?;
+        for &frame in frames {
+            let silhouettes = Silhouettes::read(&self.shared.resources, clips, frame..frame + 1).await?;
             moments.push(Moment { frame, views: silhouettes.views(frame).map_err(JobError::retry)? });
         }
-        Ok(moments)
+        let (model, parameters) = (model.clone(), parameters.clone());
+        let found = compute::run(move || fit::fit(&model, moments, &parameters)).await;
+        found.map_err(FindError::Nobody)
     }
 
     async fn body(
@@ -159,19 +210,19 @@ impl InitialiseHandler {
         camera: &CameraReport,
         artefacts: &[Artefact],
         moments: &Arc<Vec<Moment>>,
-        fits: &Arc<Vec<Fit>>,
+        (model, fits): (&Arc<BodyModel>, &Arc<Vec<Fit>>),
     ) -> Result<Option<ResultFile>, JobError> {
         let Some(frame) = moments.first().map(|moment| moment.frame) else { return Ok(None) };
         let Some(artefact) = named(artefacts, &picture_name(camera.index, frame)) else { return Ok(None) };
         let bytes = self.shared.resources.read_artefact(artefact, MAX_PICTURE_BYTES).await?;
         let own = camera.camera.camera().map_err(JobError::retry)?;
         let name = format!("overlay_{}.png", file_part(&camera.camera.name, camera.index));
-        let fits = fits.clone();
+        let (model, fits) = (model.clone(), fits.clone());
         let drawn = compute::run(move || -> Result<ResultFile, JobError> {
             let read = image_files::read_image(&bytes, &image_files::Limits::default());
             let mut picture: Image = read.map_err(JobError::retry)?;
             if let Some(first) = fits.first() {
-                fit::draw_over(&mut picture, &own, &first.mesh, OUTLINE);
+                Drawer::new(&model, &own).outline(&mut picture, &first.mesh.vertices, FITS);
             }
             Ok(results::picture(name, &picture))
         });
@@ -184,8 +235,62 @@ impl InitialiseHandler {
     }
 }
 
+/// Why no body was found.
+enum FindError {
+    /// nobody is there, or they can't be recognised
+    Nobody(InputError),
+    /// something else
+    Job(JobError),
+}
+
+impl From<JobError> for FindError {
+    fn from(error: JobError) -> Self {
+        Self::Job(error)
+    }
+}
+
+/// One past the last frame that all cameras have.
+fn end_frame(cameras: &[CameraReport], warnings: &mut Vec<String>) -> usize {
+    let ends = || cameras.iter().map(|camera| camera.end_frame);
+    let (first, last) = (ends().min().unwrap_or(0), ends().max().unwrap_or(0));
+    if first < last {
+        warnings.push(format!(
+            "cameras have {first} to {last} frames: only those that all have are used, and all are taken to begin at the same \
+             moment"
+        ));
+    }
+    first
+}
+
+/// Frames a second: as asked for, or as the videos say.
+fn frame_rate(parameters: &Parameters, cameras: &[CameraReport], warnings: &mut Vec<String>) -> f64 {
+    let rates = || cameras.iter().filter_map(|camera| camera.frame_rate);
+    if let Some(asked) = parameters.frame_rate {
+        return asked;
+    }
+    let Some(rate) = rates().next() else {
+        if parameters.track {
+            warnings.push(format!(
+                "no file tells the frame rate: {FRAME_RATE} frames a second are assumed; say it with --set frame_rate=60"
+            ));
+        }
+        return FRAME_RATE;
+    };
+    if let Some(other) = rates().find(|other| (other - rate).abs() > 0.01 * rate) {
+        warnings.push(format!(
+            "the videos have {rate:.3} and {other:.3} frames a second: frames are taken to be of the same moments all the same, \
+             and {rate:.3} is used; convert them to one rate"
+        ));
+    }
+    rate
+}
+
 /// Why no body was found, with what is known of the cameras: poor silhouettes are the usual reason.
-fn explained(error: InputError, cameras: &[CameraReport]) -> JobError {
+fn explained(error: FindError, cameras: &[CameraReport]) -> JobError {
+    let error = match error {
+        FindError::Nobody(error) => error,
+        FindError::Job(error) => return error,
+    };
     let mut message = error.to_string();
     let advice = cameras.iter().filter_map(|camera| {
         let quality = camera.quality.as_ref().filter(|quality| !quality.advice.is_empty())?;

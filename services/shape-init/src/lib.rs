@@ -1,22 +1,27 @@
 //! The shape-init service: body models from scans, silhouettes from cameras, pose and shape of a person in the first frames.
 //!
-//! [`start`] runs the gRPC server (`marey.v1.ShapeInit`, health, reflection) and claims four kinds of job:
+//! [`start`] runs the gRPC server (`marey.v1.ShapeInit`, health, reflection) and claims five kinds of job:
 //!
 //! ```text
-//! build-body-model          plan-multi-view ──► make-silhouettes × cameras ──► initialise-body
+//! build-body-model     plan-multi-view ──► make-silhouettes × cameras ──► initialise-body ──► (refinement) ──► draw-overlay × cameras
 //! ```
 //!
 //! The plan reads the calibration and finds out whose file is whose. One job a camera streams its frames and leaves packed
-//! silhouettes, ten seconds an artefact, with what was found of their quality. The last fits a body to the first frames and
-//! writes the results. Jobs that follow the person through all frames hang behind it and read the same artefacts.
+//! silhouettes, ten seconds an artefact, with what was found of their quality. `initialise-body` fits a body to the first
+//! frames and enqueues the jobs that follow the person through all of them, which the refinement service takes; what they
+//! found is drawn over what each camera saw.
 
 mod build_job;
+mod children;
+mod drawing;
 mod error;
 mod fit;
 mod frames;
 mod hull;
 mod initialise_job;
 mod members;
+mod opened;
+mod overlay_job;
 mod payload;
 mod plan_job;
 mod results;
@@ -71,7 +76,8 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
             .handler(build_job::BuildHandler::new(shared.clone()))
             .handler(plan_job::PlanHandler::new(shared.clone()))
             .handler(silhouettes_job::SilhouettesHandler::new(shared.clone()))
-            .handler(initialise_job::InitialiseHandler::new(shared))
+            .handler(initialise_job::InitialiseHandler::new(shared.clone()))
+            .handler(overlay_job::OverlayHandler::new(shared))
     });
     let parts = Parts {
         name: NAME,

@@ -14,6 +14,10 @@ pub(crate) struct ResultFile {
     pub content: Vec<u8>,
 }
 
+/// The body with its skeleton, skin and motion.
+pub(crate) const BODY: &str = "body.glb";
+/// The skeleton in its poses.
+pub(crate) const POSE: &str = "pose.bvh";
 const BINARY: &str = "application/octet-stream";
 
 /// Mesh, skinned body and skeleton.
@@ -31,8 +35,8 @@ pub(crate) fn body_files(
     let glb = body_files::glb(model, shape, Some(Poses { poses: &poses, frame_rate }))?;
     let file = |name: &str, media_type, content| ResultFile { name: name.to_owned(), media_type, content };
     let mut files = vec![
-        file("body.glb", "model/gltf-binary", glb),
-        file("pose.bvh", "text/plain; charset=utf-8", formats::bvh::write(&motion).into_bytes()),
+        file(BODY, "model/gltf-binary", glb),
+        file(POSE, "text/plain; charset=utf-8", formats::bvh::write(&motion).into_bytes()),
     ];
     if let Some(first) = fits.first() {
         files.push(file("mesh.ply", BINARY, formats::ply::write(&first.mesh)));

@@ -22,7 +22,7 @@ const SAMPLE_BYTES: usize = 400 << 20;
 pub(crate) enum Piece {
     /// packed silhouettes
     Clip { first_frame: usize, num_frames: usize, bytes: Vec<u8> },
-    /// what the camera saw in a frame from which the shape is found, and the silhouette made of it
+    /// what the camera saw in the first frame, and the silhouette made of it
     Picture { frame: usize, image: Image, silhouette: Silhouette },
 }
 
@@ -42,7 +42,6 @@ pub(crate) struct Made {
 /// Packs silhouettes into clips and keeps the pictures that are wanted.
 struct Packer<'a, S> {
     parameters: &'a Parameters,
-    wanted: Vec<usize>,
     frame: usize,
     expected: Option<usize>,
     clip: Option<ClipWriter>,
@@ -56,8 +55,7 @@ impl<'a, S: Sink> Packer<'a, S> {
             (Some(left), Some(asked)) => Some(left.min(asked)),
             (left, asked) => left.or(asked),
         };
-        let wanted = parameters.frames_of_shape(usize::MAX);
-        Self { parameters, wanted, frame: parameters.first_frame, expected, clip: None, sink }
+        Self { parameters, frame: parameters.first_frame, expected, clip: None, sink }
     }
 
     /// Whether as many frames came as were asked for.
@@ -73,7 +71,7 @@ impl<'a, S: Sink> Packer<'a, S> {
         clip.push(silhouette)?;
         let is_clip_full = clip.num_frames() == CLIP_FRAMES;
         let mut goes_on = true;
-        if self.wanted.contains(&self.frame) {
+        if self.frame == self.parameters.first_frame {
             let (image, silhouette) = (image(), silhouette.clone());
             goes_on &= self.sink.piece(Piece::Picture { frame: self.frame, image, silhouette });
         }
@@ -154,7 +152,7 @@ pub(crate) fn of_masks(
 }
 
 /// A mask as a picture to draw on.
-fn painted(mask: &Silhouette) -> Image {
+pub(crate) fn painted(mask: &Silhouette) -> Image {
     let mut image = Image::black(mask.width(), mask.height());
     for y in 0..mask.height() {
         for x in 0..mask.width() {

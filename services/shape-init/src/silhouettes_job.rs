@@ -11,9 +11,7 @@ use std::{
 use formats::{calibration::fit_to_image, image_files};
 use model::Image;
 use multi_view::CameraRecord;
-use payloads::{
-    CameraReport, ClipPlace, Source, SourceKind, clip_name, file_part, picture_name, report_name,
-};
+use payloads::{CameraReport, ClipPlace, Source, clip_name, file_part, picture_name, report_name};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{FileError, compute, objects};
 use tempfile::TempDir;
@@ -21,10 +19,8 @@ use tokio::sync::mpsc;
 
 use crate::{
     InputError, MAKE_SILHOUETTES, Shared,
-    frames::Frames,
-    members,
+    opened::{Opened, entries, open},
     payload::MakeSilhouettes,
-    scratch,
     segment::{self, Made, Piece, Sink},
 };
 
@@ -57,7 +53,8 @@ impl Handler for SilhouettesHandler {
         let index = payload.index;
         job.progress(0.0, format!("camera {}: reading {}", payload.camera.name, payload.source.name));
         let scratch = TempDir::new().map_err(JobError::retry)?;
-        let opened = self.open(&payload, &scratch).await?;
+        let opened =
+            open(resources, &payload.source, payload.parameters.largest_side, scratch.path()).await?;
         let plate = self.plate(payload.plate.as_ref()).await?;
         job.check()?;
         let (made, written) = self.make(&job, &payload, opened, plate).await?;
@@ -80,12 +77,6 @@ impl Handler for SilhouettesHandler {
     }
 }
 
-/// The pictures of a camera, ready to be read.
-enum Opened {
-    Masks(Vec<formats::archive::Entry>),
-    Frames(Frames),
-}
-
 /// What came of a camera.
 struct OfCamera {
     made: Made,
@@ -99,38 +90,9 @@ struct Written {
 }
 
 impl SilhouettesHandler {
-    async fn open(&self, payload: &MakeSilhouettes, scratch: &TempDir) -> Result<Opened, JobError> {
-        let source = &payload.source;
-        let name = source.name.clone();
-        match source.kind {
-            SourceKind::Video => {
-                let path = scratch::copy(&self.shared.resources.store, &source.file, scratch.path()).await?;
-                let largest_side = payload.parameters.largest_side;
-                Ok(Opened::Frames(Frames::Video { path, name, largest_side }))
-            }
-            SourceKind::Masks => Ok(Opened::Masks(self.entries(source).await?)),
-            SourceKind::Images | SourceKind::Plate => {
-                let entries = self.entries(source).await?;
-                Ok(Opened::Frames(Frames::Pictures { entries, name }))
-            }
-        }
-    }
-
-    async fn entries(&self, source: &Source) -> Result<Vec<formats::archive::Entry>, JobError> {
-        let resources = &self.shared.resources;
-        let bytes = resources.read_file(&source.file, resources.memory.max_object_bytes).await?;
-        let (name, members) = (source.file.name.clone(), source.members.clone());
-        let most = resources.memory.max_build_bytes;
-        let read = compute::run(move || match &members {
-            Some(members) => members::read(&name, &bytes, members, most),
-            None => Ok(vec![formats::archive::Entry { name, bytes: bytes.to_vec() }]),
-        });
-        Ok(read.await.map_err(InputError::from)?)
-    }
-
     async fn plate(&self, source: Option<&Source>) -> Result<Option<Image>, JobError> {
         let Some(source) = source else { return Ok(None) };
-        let entries = self.entries(source).await?;
+        let entries = entries(&self.shared.resources, source).await?;
         let name = source.name.clone();
         let read = compute::run(move || {
             let entry =
@@ -185,7 +147,6 @@ impl SilhouettesHandler {
                 written.clips.push(ClipPlace { name, first_frame, num_frames });
             }
             Piece::Picture { frame, mut image, silhouette } => {
-                let is_first = frame == payload.parameters.first_frame;
                 let (plain, drawn) = compute::run(move || {
                     let plain = image_files::write_image(&image);
                     shape_fit::draw_outline(&mut image, &silhouette, OUTLINE);
@@ -194,13 +155,9 @@ impl SilhouettesHandler {
                 .await;
                 let name = picture_name(payload.index, frame);
                 written.artefacts.push(objects::write(store, job, &name, "image/png", plain).await?);
-                if is_first {
-                    // A run that fails later shows here what its cameras saw.
-                    let name = format!("silhouette_{}.png", file_part(&payload.camera.name, payload.index));
-                    written
-                        .artefacts
-                        .push(objects::write_result(store, job, &name, "image/png", drawn).await?);
-                }
+                // A run that fails later shows here what its cameras saw.
+                let name = format!("silhouette_{}.png", file_part(&payload.camera.name, payload.index));
+                written.artefacts.push(objects::write_result(store, job, &name, "image/png", drawn).await?);
             }
         }
         Ok(())

@@ -3,7 +3,7 @@
 use body::BodyModel;
 use formats::{calibration, image_files, ply};
 use model::{Camera, Mesh};
-use proto::v1::{self, HullSilhouette, MeshFormat, shape_init_client::ShapeInitClient};
+use proto::v1::{self, CameraSilhouette, MeshFormat, shape_init_client::ShapeInitClient};
 use service::{Config, Running};
 use store::Location;
 use testkit::postgres::TestDatabase;
@@ -130,10 +130,10 @@ async fn bodies_that_nobody_has_are_refused_with_what_was_expected() {
 }
 
 /// Eight cameras around a body: the calibration, and what they see.
-fn seen(mesh: &Mesh) -> (String, Vec<HullSilhouette>) {
+fn seen(mesh: &Mesh) -> (String, Vec<CameraSilhouette>) {
     let cameras: Vec<Camera> = Ring::default().cameras();
     let masks = silhouettes(mesh, &cameras);
-    let views = cameras.iter().zip(&masks).map(|(camera, mask)| HullSilhouette {
+    let views = cameras.iter().zip(&masks).map(|(camera, mask)| CameraSilhouette {
         camera: camera.name.clone(),
         image: image_files::write_silhouette(mask),
     });

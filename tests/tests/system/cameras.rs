@@ -64,8 +64,11 @@ fn a_body_is_found_in_the_masks_of_eight_cameras() -> Result<()> {
     let api = system.project("p")?;
     let calibration = fs::read(data.join("calibration.json"))?;
     let masks = masks(&data, 0..8, 2)?;
-    let (run, end) =
-        run(&api, &[("calibration.json", &calibration), ("silhouettes.tar", &masks)], &json!({}))?;
+    let (run, end) = run(
+        &api,
+        &[("calibration.json", &calibration), ("silhouettes.tar", &masks)],
+        &json!({"parameters": {"track": false}}),
+    )?;
     ensure!(end["state"] == "succeeded", "{end}");
 
     let shape: Value = serde_json::from_slice(&result(&api, &run, "shape.json")?)?;
@@ -128,7 +131,7 @@ fn a_real_capture_ends_in_a_body_or_in_words_that_help() -> Result<()> {
     }
     let files: Vec<(&str, &[u8])> =
         files.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice())).collect();
-    let (run, end) = run(&api, &files, &json!({"parameters": {"num_frames": 12}}))?;
+    let (run, end) = run(&api, &files, &json!({"parameters": {"num_frames": 12, "track": false}}))?;
     println!("{end}");
     for camera in ["cam01", "cam02", "cam03", "cam04"] {
         keep(&format!("silhouette_{camera}.png"), &result(&api, &run, &format!("silhouette_{camera}.png"))?)?;

@@ -11,6 +11,7 @@ mod interface;
 mod live;
 mod markers;
 mod runs;
+mod tracking;
 mod uploads;
 
 use std::sync::OnceLock;

@@ -1,0 +1,68 @@
+//! What is wrong with a session or with a question.
+
+use camera_jobs::ModelError;
+use proto::ErrorCode;
+use queue::JobError;
+use service::FileError;
+
+/// Something about the input that only its owner can mend. The message is for them.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// A file can't be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Silhouettes are missing or damaged.
+    #[error(transparent)]
+    Silhouettes(#[from] multi_view::Error),
+    /// No body is to be found.
+    #[error(transparent)]
+    Fit(#[from] shape_fit::Error),
+    /// Nothing can be tracked.
+    #[error(transparent)]
+    Tracking(#[from] tracking::Error),
+    /// A body that can't be written.
+    #[error(transparent)]
+    Body(#[from] body::Error),
+    /// A body that can't be written as GLB.
+    #[error(transparent)]
+    BodyFile(#[from] body_files::Error),
+    /// Joints that can't be written.
+    #[error(transparent)]
+    Joints(#[from] model::Error),
+}
+
+impl From<InputError> for JobError {
+    fn from(error: InputError) -> Self {
+        // A job that was stopped is not one with bad input.
+        match error {
+            InputError::Tracking(tracking::Error::Stopped { .. }) => Self::Stopped,
+            error => Self::give_up(error.to_string(), format!("{error:?}")),
+        }
+    }
+}
+
+/// Why a gRPC call can't be answered.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CallError {
+    #[error(transparent)]
+    Request(#[from] proto::Error),
+    #[error(transparent)]
+    Input(#[from] InputError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+impl From<CallError> for tonic::Status {
+    fn from(error: CallError) -> Self {
+        let code = match &error {
+            CallError::Input(InputError::Tracking(tracking::Error::Stopped { .. })) => ErrorCode::Cancelled,
+            CallError::Request(_) | CallError::Input(_) => ErrorCode::InvalidInput,
+            CallError::Model(error) => error.code(),
+        };
+        if matches!(code, ErrorCode::Unavailable | ErrorCode::NotReady) {
+            tracing::error!(error = ?error, "call failed");
+        }
+        code.status(error)
+    }
+}

@@ -1,0 +1,140 @@
+//! The job that puts the chunks together and writes the results.
+
+use std::{sync::Arc, time::Instant};
+
+use camera_jobs::{MERGE_TRACKS, MergeTracks, TRACKED, TrackingSession, named};
+use payloads::{JobReport, MultiViewReport, TrackingParts};
+use queue::{Artefact, Handler, JobContext, JobError, Outcome};
+use service::{compute, objects};
+use tracking::{Chunk, Stage, hold_unseen, merge};
+
+use crate::{
+    InputError, Shared,
+    report::{self, Meeting},
+    results::{EXPORTS, Finished},
+    track_job::{chunk_name, report_name},
+};
+
+/// Largest artefact of a chunk, bytes: its longest has some thousand frames of a kilobyte.
+const MAX_CHUNK_BYTES: u64 = 256 << 20;
+/// Name of the result with everything that decided the others.
+const RUN: &str = "run.json";
+
+pub(crate) struct MergeHandler {
+    shared: Arc<Shared>,
+}
+
+impl MergeHandler {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+}
+
+impl Handler for MergeHandler {
+    fn kind(&self) -> &'static str {
+        MERGE_TRACKS
+    }
+
+    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+        let started = Instant::now();
+        let resources = &self.shared.resources;
+        let store = &resources.store;
+        objects::clean_up_earlier_attempts(store, &job).await;
+        let payload: MergeTracks = job.payload()?;
+        job.progress(0.0, "putting the parts together");
+        let session = Arc::new(TrackingSession::read(resources, &payload.session).await?);
+        let (finished, chunks) = self.merge(&job, &session).await?;
+        let finished = Arc::new(finished);
+        let of = finished.clone();
+        let tracked = compute::run(move || of.tracked.to_bytes()).await.map_err(InputError::from)?;
+        let mut written =
+            vec![objects::write(store, &job, TRACKED, "application/octet-stream", tracked).await?];
+        written.extend(self.export(&job, &finished).await?);
+        let merge = resources.job_report(&job, started, finished.tracked.frames.len());
+        let warnings = [&session.warnings[..], &report::doubts(&finished)].concat();
+        let parts = TrackingParts { found: report::found(&finished), chunks: &chunks, merge: &merge };
+        let report = MultiViewReport::new(
+            job.run_id().0,
+            &session.request,
+            (&session.plan, &session.initialise),
+            &session.cameras,
+            &warnings,
+            Some(parts),
+        );
+        let report = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
+        written.push(objects::write_result(store, &job, RUN, "application/json", report).await?);
+        Ok(written.into_iter().fold(Outcome::default(), Outcome::artefact))
+    }
+}
+
+impl MergeHandler {
+    /// The whole session, and who tracked its parts.
+    async fn merge(
+        &self,
+        job: &JobContext,
+        session: &Arc<TrackingSession>,
+    ) -> Result<(Finished, Vec<JobReport>), JobError> {
+        let Shared { resources, models } = &*self.shared;
+        let artefacts = resources.artefacts_before(job).await?;
+        let (mut chunks, mut reports) = (Vec::new(), Vec::new());
+        for index in 0.. {
+            let Some(artefact) = named(&artefacts, &chunk_name(index)) else { break };
+            job.check()?;
+            let bytes = resources.read_artefact(artefact, MAX_CHUNK_BYTES).await?;
+            chunks.push(Chunk::from_bytes(&bytes).map_err(JobError::retry)?);
+            let report = named(&artefacts, &report_name(index))
+                .ok_or_else(|| JobError::retry(format!("{} is missing", report_name(index))))?;
+            let bytes = resources.read_artefact(report, MAX_CHUNK_BYTES).await?;
+            reports.push(serde_json::from_slice(&bytes).map_err(JobError::retry)?);
+        }
+        let model = models.get(&session.request.body_model).await?;
+        let session = session.clone();
+        let finished = compute::run(move || -> Result<Finished, InputError> {
+            let shape = model.shape(&session.alpha);
+            let mut merged = merge(&model, &shape, &chunks)?;
+            let meetings = merged.seams.iter().zip(chunks.windows(2)).map(|(seam, pair)| Meeting {
+                seam: *seam,
+                is_blind: has_unseen_in_common(&pair[0], &pair[1]),
+            });
+            let meetings = meetings.collect();
+            drop(chunks);
+            hold_unseen(&model, &shape, &mut merged.frames);
+            let cameras = session.clips.iter().map(|of| of.camera.name.clone()).collect();
+            let frame_rate = session.frame_rate;
+            Ok(Finished {
+                model,
+                shape,
+                tracked: Chunk { frames: merged.frames },
+                meetings,
+                cameras,
+                frame_rate,
+            })
+        });
+        Ok((finished.await?, reports))
+    }
+
+    /// Writes the motion in every format, one after the other.
+    async fn export(&self, job: &JobContext, finished: &Arc<Finished>) -> Result<Vec<Artefact>, JobError> {
+        let mut written = Vec::new();
+        for (done, export) in EXPORTS.iter().enumerate() {
+            job.check()?;
+            job.progress(0.2 + 0.75 * done as f64 / EXPORTS.len() as f64, format!("writing {}", export.name));
+            let finished = finished.clone();
+            let content = compute::run(move || (export.write)(&finished)).await?;
+            let store = &self.shared.resources.store;
+            written.push(objects::write_result(store, job, export.name, export.media_type, content).await?);
+        }
+        Ok(written)
+    }
+}
+
+/// Whether nobody was found by one of two chunks in a frame that both have: they can't disagree there.
+fn has_unseen_in_common(earlier: &Chunk, later: &Chunk) -> bool {
+    let Some(begin) = later.frames.first().map(|tracked| tracked.frame) else { return true };
+    let end = earlier.frames.last().map_or(0, |tracked| tracked.frame);
+    let unseen = |chunk: &Chunk| {
+        let common = chunk.frames.iter().filter(|tracked| (begin..=end).contains(&tracked.frame));
+        common.into_iter().any(|tracked| tracked.stage == Stage::Unseen)
+    };
+    unseen(earlier) || unseen(later)
+}

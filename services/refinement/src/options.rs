@@ -1,0 +1,29 @@
+//! From what a run or a call asks for to the tracker's options.
+
+use multi_view::Parameters;
+use tracking::{Options, ParticleOptions};
+
+/// How a person is found in a key frame.
+pub(crate) fn of_fit(parameters: &Parameters) -> shape_fit::Options {
+    shape_fit::Options {
+        least_iou: parameters.least_overlap,
+        leave_out_bad_view: parameters.leave_out_bad_view,
+        ..shape_fit::Options::default()
+    }
+}
+
+/// How a person is followed in a run.
+pub(crate) fn of_run(parameters: &Parameters) -> Options {
+    let particles = ParticleOptions {
+        particles: parameters.particles,
+        iterations: parameters.iterations,
+        with_prior: parameters.prior,
+        session: parameters.seed,
+        ..ParticleOptions::default()
+    };
+    Options {
+        fit: of_fit(parameters),
+        particles: (parameters.particles > 0).then_some(particles),
+        ..Options::default()
+    }
+}

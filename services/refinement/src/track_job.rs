@@ -1,0 +1,108 @@
+//! The job that follows a person through one chunk of a session.
+
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::Instant,
+};
+
+use body::BodyModel;
+use camera_jobs::{Silhouettes, TRACK_CHUNK, TrackChunk, TrackingSession, View};
+use queue::{Handler, JobContext, JobError, Outcome};
+use service::{
+    compute::{self, StopOnDrop},
+    objects,
+};
+use tracking::{Chunk, Footage, Tracker, follow};
+
+use crate::{InputError, Shared, options};
+
+pub(crate) struct TrackHandler {
+    shared: Arc<Shared>,
+}
+
+impl TrackHandler {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+}
+
+/// Name of the artefact with the frames of a chunk.
+pub(crate) fn chunk_name(index: usize) -> String {
+    format!("chunk-{index:06}.bin")
+}
+
+/// Name of the artefact that says who tracked a chunk.
+pub(crate) fn report_name(index: usize) -> String {
+    format!("chunk-{index:06}.json")
+}
+
+impl Handler for TrackHandler {
+    fn kind(&self) -> &'static str {
+        TRACK_CHUNK
+    }
+
+    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+        let started = Instant::now();
+        let Shared { resources, models } = &*self.shared;
+        let store = &resources.store;
+        objects::clean_up_earlier_attempts(store, &job).await;
+        let payload: TrackChunk = job.payload()?;
+        job.progress(0.0, format!("part {} of {}: reading", payload.chunk + 1, payload.num_chunks));
+        let session = TrackingSession::read(resources, &payload.session).await?;
+        let frames = payload.start..payload.end;
+        let silhouettes = Silhouettes::read(resources, &session.clips, frames.clone()).await?;
+        let model = models.get(&session.request.body_model).await?;
+        let stop = StopOnDrop::default();
+        let (of, flag, work) = (job.clone(), stop.flag(), payload.clone());
+        let tracked = compute::run(move || track(&model, &session, &silhouettes, &work, &of, &flag));
+        tokio::pin!(tracked);
+        let chunk = tokio::select! {
+            chunk = &mut tracked => chunk,
+            () = job.cancelled() => {
+                // it is looked at before every step inside a frame
+                stop.stop();
+                tracked.await
+            }
+        };
+        job.check()?;
+        let bytes = chunk?.to_bytes().map_err(InputError::from)?;
+        let report = resources.job_report(&job, started, frames.len());
+        let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
+        let chunk =
+            objects::write(store, &job, &chunk_name(payload.chunk), "application/octet-stream", bytes)
+                .await?;
+        let report =
+            objects::write(store, &job, &report_name(payload.chunk), "application/json", report).await?;
+        Ok(Outcome::default().artefact(chunk).artefact(report))
+    }
+}
+
+/// All of the work on the frames.
+fn track(
+    model: &BodyModel,
+    session: &TrackingSession,
+    silhouettes: &Silhouettes,
+    payload: &TrackChunk,
+    job: &JobContext,
+    stop: &AtomicBool,
+) -> Result<Chunk, InputError> {
+    let parameters = &session.request.parameters;
+    let fit_options = options::of_fit(parameters);
+    // until the person is found
+    let rest = vec![0.0; model.rig().num_dofs()];
+    let mut tracker = Tracker::new(model, &session.alpha, &rest, options::of_run(parameters))?;
+    let num_frames = payload.end - payload.start;
+    let footage = Footage {
+        frames: payload.start..payload.end,
+        views: |frame| Ok::<_, InputError>(silhouettes.views(frame)?),
+        find: |views: &[View]| {
+            let found = shape_fit::fit_pose(model, &session.alpha, views, &fit_options);
+            found.ok().map(|fit| fit.pose)
+        },
+    };
+    follow(&mut tracker, footage, stop, |done| {
+        let part = format!("part {} of {}", payload.chunk + 1, payload.num_chunks);
+        let phrase = format!("{part}: frame {done} of {num_frames}");
+        job.progress(done as f64 / num_frames.max(1) as f64, phrase);
+    })
+}
