@@ -5,6 +5,7 @@
 //! - [`evaluate_sparse`]: trials reconstructed from their own control points, by [`Protocol`], in every case of a [`Sweep`]:
 //!   methods, windows, sizes of the database, noise, gaps.
 //! - [`shape_errors`]: how far a body found in silhouettes is from the true one; [`Distribution`] over many.
+//! - [`Proportion`], [`PairedDifference`]: how often something succeeds, and whether one way does so oftener than another.
 //! - [`summarise`] into [`Row`]s, [`tables`] of them beside the papers' own, and HTML reports ([`report`]).
 
 mod body;
@@ -16,6 +17,7 @@ mod feet;
 mod gap;
 mod metrics;
 mod models;
+mod proportion;
 mod protocol;
 pub mod report;
 mod shape;
@@ -35,6 +37,7 @@ pub use error::Error;
 pub use feet::{ContactThresholds, FootPaths, FootSlide, foot_slide};
 pub use gap::{GapErrors, gap_errors};
 pub use metrics::{Comparison, Errors, JointErrors, compare, compare_in_detail};
+pub use proportion::{PairedDifference, Proportion, Verdict};
 pub use protocol::{ControlSet, Protocol};
 pub use shape::{Body, Distribution, ShapeErrors, shape_errors};
 pub use sparse_protocol::{SparseEvaluation, TrialResult, evaluate_sparse};

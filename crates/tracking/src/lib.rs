@@ -23,6 +23,7 @@ mod parzen_term;
 mod predict;
 mod prediction_term;
 mod random;
+pub mod recovery;
 mod silhouette_term;
 mod texture_term;
 mod tracker;

@@ -271,7 +271,8 @@ impl<'a> Tracker<'a> {
         Some(found)
     }
 
-    fn search_dofs(
+    /// As [`search`](Self::search), over the DOFs of these indices.
+    pub fn search_dofs(
         &mut self,
         frame: &ObservedFrame,
         prediction: &[f64],

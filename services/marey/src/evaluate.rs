@@ -3,6 +3,10 @@
 pub(crate) mod motions;
 
 mod body_commands;
+mod capture;
+mod multiview;
+mod overlay;
+mod recovery;
 mod run_command;
 mod shape;
 mod sparse_command;
@@ -28,6 +32,10 @@ enum What {
     Run(run_command::Args),
     /// Find pose and shape of a known body in silhouettes, and compare
     Shape(Box<shape::Args>),
+    /// Follow a known body through the frames of a capture, and compare
+    Multiview(Box<multiview::Args>),
+    /// Disturb poses and see which search finds them again
+    Recovery(Box<recovery::Args>),
 }
 
 /// Runs `marey evaluate`.
@@ -38,5 +46,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         What::Feet(args) => body_commands::feet(&args),
         What::Run(args) => run_command::run(&args),
         What::Shape(args) => shape::run(&args),
+        What::Multiview(args) => multiview::run(&args),
+        What::Recovery(args) => recovery::run(&args),
     }
 }

@@ -1,21 +1,28 @@
 //! `marey evaluate shape`.
 
-mod capture;
 mod leave_one_out;
 
-use std::{fs, path::PathBuf, time::Instant};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use anyhow::{Context, bail};
 use body::BodyModel;
 use evaluation::{Body, ShapeErrors, shape_errors};
 use formats::image_files::write_image;
 use indicatif::{ProgressBar, ProgressStyle};
-use model::{Camera, Image, Silhouette};
+use model::{Camera, Silhouette};
 use serde::Serialize;
-use shape_fit::{Fit, Options, cleaned, draw_outline, fit};
-use vision::{Rasteriser, Topology, View, scene::SilhouetteNoise};
+use shape_fit::{Fit, Options, fit};
+use vision::{Topology, scene::SilhouetteNoise};
 
-use super::written::write;
+use super::{
+    capture::Folder,
+    overlay::{drawn, overlay},
+    written::write,
+};
 
 /// `marey evaluate shape`
 #[derive(Debug, clap::Args)]
@@ -89,26 +96,27 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         return leave_one_out::run(scans, args);
     };
     let model = model(args.model.as_ref())?;
-    let mut capture = capture::read(folder, args.frame, &args.cameras)?;
-    for (index, (_, silhouette)) in capture.views.iter_mut().enumerate() {
+    let capture = Folder::open(folder, &args.cameras)?;
+    let (mut views, truth) = (capture.views(args.frame)?, capture.body(args.frame)?);
+    for (index, (_, silhouette)) in views.iter_mut().enumerate() {
         if let Some(seed) = args.noise {
             SilhouetteNoise::default().add_to(silhouette, seed, index as u64);
         }
     }
     let spinner = ProgressBar::new_spinner()
         .with_style(ProgressStyle::with_template("{spinner} looking for the body in {msg} views  {elapsed}")?)
-        .with_message(capture.views.len().to_string());
+        .with_message(views.len().to_string());
     spinner.enable_steady_tick(std::time::Duration::from_millis(200));
     let start = Instant::now();
-    let found = fit(&model, &capture.views, &Options::default());
+    let found = fit(&model, &views, &Options::default());
     let seconds = start.elapsed().as_secs_f64();
     spinner.finish_and_clear();
     let found = found.with_context(|| format!("frame {} of {}", args.frame, folder.display()))?;
-    let errors = shape_errors(&body_of(&model, &found), &capture.truth)
+    let errors = shape_errors(&body_of(&model, &found), &truth)
         .context("the true mesh has no surface, or none of its joints is called as one of the model's")?;
     print(&errors, &found, seconds);
     if let Some(folder) = &args.overlay {
-        overlays(folder, &capture, &found)?;
+        overlays(folder, &capture, args.frame, &views, &found)?;
     }
     if let Some(path) = &args.json {
         let views = found.views.iter();
@@ -127,7 +135,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn model(file: Option<&PathBuf>) -> anyhow::Result<BodyModel> {
+pub(super) fn model(file: Option<&PathBuf>) -> anyhow::Result<BodyModel> {
     let Some(file) = file else { return Ok(BodyModel::shipped()) };
     let bytes = fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
     BodyModel::from_bytes(&bytes).with_context(|| format!("cannot use {}", file.display()))
@@ -153,36 +161,20 @@ fn print(errors: &ShapeErrors, found: &Fit, seconds: f64) {
     println!("(paper: one subject beside a laser scan, 8 views)");
 }
 
-/// One picture a camera: the camera's own or the silhouette, the outline of the silhouette in blue and of the body in orange.
-fn overlays(folder: &PathBuf, capture: &capture::Capture, found: &Fit) -> anyhow::Result<()> {
+/// One picture a camera.
+fn overlays(
+    folder: &Path,
+    capture: &Folder,
+    frame: u32,
+    views: &[(Camera, Silhouette)],
+    found: &Fit,
+) -> anyhow::Result<()> {
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let topology = Topology::new(&found.mesh.faces, found.mesh.vertices.len());
-    for ((camera, silhouette), picture) in capture.views.iter().zip(&capture.pictures) {
-        let mut picture = match picture {
-            Some(path) => capture::picture(path)?,
-            None => grey(silhouette),
-        };
-        draw_outline(&mut picture, &cleaned(silhouette), [60, 140, 255]);
-        draw_outline(&mut picture, &drawn(camera, &topology, found), [255, 140, 0]);
+    for (index, (camera, silhouette)) in views.iter().enumerate() {
+        let body = drawn(camera, &topology, &found.mesh.vertices);
+        let picture = overlay(capture.picture(index, frame)?, silhouette, &body);
         write(&folder.join(format!("{}.png", camera.name)), write_image(&picture))?;
     }
     Ok(())
-}
-
-fn drawn(camera: &Camera, topology: &Topology, found: &Fit) -> Silhouette {
-    let mut silhouette = Silhouette::empty(0, 0);
-    Rasteriser::new().silhouette(&View::new(camera), &found.mesh.vertices, topology, &mut silhouette);
-    silhouette
-}
-
-fn grey(silhouette: &Silhouette) -> Image {
-    let mut picture = Image::black(silhouette.width(), silhouette.height());
-    for y in 0..silhouette.height() {
-        for x in 0..silhouette.width() {
-            if silhouette.contains(x as isize, y as isize) {
-                picture.set(x, y, [110; 3]);
-            }
-        }
-    }
-    picture
 }

@@ -14,11 +14,11 @@ use serde::Serialize;
 use shape_fit::{Options, fit};
 use vision::scene::{Ring, SilhouetteNoise, silhouettes};
 
-use super::{
-    Args, body_of,
+use super::{Args, body_of};
+use crate::evaluate::{
     capture::{bytes, list},
+    written::write,
 };
-use crate::evaluate::written::write;
 
 /// What the name of the base pose contains.
 const BASE: &str = "base";

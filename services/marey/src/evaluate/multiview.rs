@@ -1,0 +1,222 @@
+//! `marey evaluate multiview`.
+
+mod film;
+mod report;
+
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+    time::Instant,
+};
+
+use anyhow::{Context, bail};
+use body::BodyModel;
+use indicatif::{ProgressBar, ProgressStyle};
+use model::{Camera, Silhouette};
+use motion_db::Clip;
+use pose_prior::training_poses;
+use shape_fit::{Fit, fit};
+use tracking::{ObservedFrame, Options, Part, ParticleOptions, Tracked, Tracker, built_in_poses};
+use vision::scene::SilhouetteNoise;
+
+use super::{capture::Folder, motions, recovery, shape, written::write};
+use film::Film;
+use report::{FrameReport, Joints, Report, Settings, Times};
+
+/// `marey evaluate multiview`
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png and groundtruth/joints.json; images/CAMERA/0000.jpg, where \
+there are any, are the ground of the overlays. The body's shape and its first pose are found in the first frame, without a start given; \
+then it is followed from frame to frame.
+
+  marey evaluate multiview captures/man/ --json errors.json
+  marey evaluate multiview captures/man/ --cameras 0,2,4,6 --noise --overlay films/
+  marey evaluate multiview captures/man/ --prior-from recordings/
+
+Joints are compared by name. Beside the result stand two that need less: local optimisation without particles, and the first pose kept \
+for all frames.")]
+pub struct Args {
+    /// Folder of a capture: calibration, silhouettes and true joints
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Only these cameras: their names, or their numbers from 0 [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "CAMERA")]
+    cameras: Vec<String>,
+    /// Turn over 1.2 % of the pixels and add blobs and holes, with this seed
+    #[arg(long, value_name = "SEED", num_args = 0..=1, default_missing_value = "1")]
+    noise: Option<u64>,
+    /// Make the prior of particles of these recordings: ASF+AMC of the CMU skeleton, also .zst or .gz [default: built-in poses]
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    prior_from: Vec<PathBuf>,
+    /// A body model to use instead of the one that comes with Marey
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Only the first frames
+    #[arg(long, value_name = "N")]
+    frames: Option<usize>,
+    /// Another seed gives other particles, the same seed the same
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Measure how long a particle search takes in every so manyth frame, without using what it finds; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    time_search_every: usize,
+    /// Write the errors to this file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a film for each camera, with the outline of the body found, to this folder
+    #[arg(long, value_name = "DIR")]
+    overlay: Option<PathBuf>,
+    /// Frames a second of these films
+    #[arg(long, value_name = "RATE", default_value_t = 15.0)]
+    rate: f64,
+}
+
+/// Runs `marey evaluate multiview`.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let model = shape::model(args.model.as_ref())?;
+    let folder = Folder::open(&args.folder, &args.cameras)?;
+    let mut frames = folder.frames();
+    frames.truncate(args.frames.unwrap_or(usize::MAX));
+    let Some(&first) = frames.first() else {
+        bail!("found no frame that all cameras have a silhouette of in {}", args.folder.display());
+    };
+    let training = prior(&model, &args.prior_from)?;
+    let joints = Joints::new(&model, &folder.joints(first)?)?;
+    let bar = ProgressBar::new(frames.len() as u64)
+        .with_style(ProgressStyle::with_template("{bar:30} {pos}/{len} frames  {msg}  {eta} left")?)
+        .with_message("looking for the body");
+    bar.tick();
+    let started = Instant::now();
+    let found = fit(&model, &seen(&folder, first, args.noise)?, &shape_fit::Options::default());
+    let found: Fit = found.with_context(|| format!("frame {first} of {}", args.folder.display()))?;
+    let mut run = Run::new(&model, &found, &training, args)?;
+    run.times.start_s = started.elapsed().as_secs_f64();
+    let mut film =
+        args.overlay.as_deref().map(|to| Film::create(to, &model, &found, &folder, args.rate)).transpose()?;
+    let mut reports = Vec::new();
+    for (index, &number) in frames.iter().enumerate() {
+        let views = seen(&folder, number, args.noise)?;
+        let (tracked, mut report) = run.frame(index, number, &views, &joints, &folder.joints(number)?)?;
+        report.kept = joints.compare(&found.joints, &folder.joints(number)?);
+        bar.set_message(format!("{:.0} mm", report.errors.mean_mm));
+        if let Some(film) = &mut film {
+            film.add(&folder, number, &views, &tracked)?;
+        }
+        reports.push(report);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    if let Some(film) = film {
+        film.finish()?;
+    }
+    let settings = Settings {
+        cameras: folder.cameras.iter().map(|camera| camera.name.clone()).collect(),
+        noise_seed: args.noise,
+        prior_poses: training.len(),
+        prior_is_recorded: !args.prior_from.is_empty(),
+        alpha: found.alpha.clone(),
+    };
+    let report = Report::new(joints, reports, &run.times, settings);
+    report.print();
+    if let Some(path) = &args.json {
+        write(path, serde_json::to_vec_pretty(&report)?)?;
+    }
+    Ok(())
+}
+
+/// Training poses of the prior.
+fn prior(model: &BodyModel, folders: &[PathBuf]) -> anyhow::Result<Vec<Vec<f64>>> {
+    if folders.is_empty() {
+        return Ok(built_in_poses(model));
+    }
+    let clips = motions::read(folders)?;
+    let all: Vec<&Clip> = clips.iter().collect();
+    Ok(training_poses(&recovery::poses(model, &all)?, recovery::TRAINING_POSES)?)
+}
+
+/// What all cameras saw in a frame, with noise if it is wanted.
+fn seen(folder: &Folder, frame: u32, noise: Option<u64>) -> anyhow::Result<Vec<(Camera, Silhouette)>> {
+    let mut views = folder.views(frame)?;
+    if let Some(seed) = noise {
+        for (view, (_, silhouette)) in views.iter_mut().enumerate() {
+            SilhouetteNoise::default().add_to(silhouette, seed.wrapping_add(frame.into()), view as u64);
+        }
+    }
+    Ok(views)
+}
+
+/// Marey and local optimisation alone, side by side, and how long they take.
+struct Run<'a> {
+    tracker: Tracker<'a>,
+    without_particles: Tracker<'a>,
+    /// for searches whose result isn't used
+    idle: Tracker<'a>,
+    time_search_every: usize,
+    times: Times,
+}
+
+impl<'a> Run<'a> {
+    fn new(model: &'a BodyModel, start: &Fit, training: &[Vec<f64>], args: &Args) -> anyhow::Result<Self> {
+        let particles = ParticleOptions { session: args.seed, ..ParticleOptions::default() };
+        let tracker = |particles: Option<ParticleOptions>| {
+            let options = Options { particles, ..Options::default() };
+            Tracker::with_training_poses(model, &start.alpha, &start.pose, options, training.to_vec())
+        };
+        Ok(Self {
+            tracker: tracker(Some(particles))?,
+            without_particles: tracker(None)?,
+            idle: tracker(Some(ParticleOptions { part: Part::Whole, ..particles }))?,
+            time_search_every: args.time_search_every,
+            times: Times::default(),
+        })
+    }
+
+    fn frame(
+        &mut self,
+        index: usize,
+        number: u32,
+        views: &[(Camera, Silhouette)],
+        joints: &Joints,
+        truth: &[(String, nalgebra::Vector3<f64>)],
+    ) -> anyhow::Result<(Tracked, FrameReport)> {
+        let stop = AtomicBool::new(false);
+        let started = Instant::now();
+        let frame = ObservedFrame::new(index, views)?;
+        let prepare_ms = ms(started);
+        let started = Instant::now();
+        let tracked = self.tracker.track(&frame, &stop)?;
+        let track_ms = ms(started);
+        let alone = self.without_particles.track(&frame, &stop)?;
+        if self.time_search_every > 0 && index % self.time_search_every == 0 {
+            let misalignment = self.idle.misalignment(&frame, &tracked.pose);
+            let started = Instant::now();
+            self.idle.search(&frame, &tracked.pose, &tracked.pose, &misalignment, &|| true);
+            self.times.search_ms.push(ms(started));
+        }
+        let report = FrameReport {
+            frame: number,
+            stage: report::stage(tracked.stage),
+            errors: joints.compare(&tracked.joints, truth),
+            iou: tracked.mean_iou(),
+            misaligned: tracked.misalignment.misaligned().map(|limb| format!("{limb:?}")).collect(),
+            limb_error_mm: 1000.0 * tracked.misalignment.worst_m(),
+            effective_sample_size: tracked.effective_sample_size,
+            prepare_ms,
+            track_ms,
+            local_only: joints.compare(&alone.joints, truth),
+            local_only_iou: alone.mean_iou(),
+            kept: report::JointErrors::default(),
+        };
+        Ok((tracked, report))
+    }
+}
+
+fn ms(since: Instant) -> f64 {
+    1000.0 * since.elapsed().as_secs_f64()
+}
+
+/// What was written, for the user.
+fn say_written(path: &Path) {
+    println!("wrote {}", path.display());
+}

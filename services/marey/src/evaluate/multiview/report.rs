@@ -1,0 +1,355 @@
+//! What was measured, as a table and as JSON.
+
+use anyhow::bail;
+use body::BodyModel;
+use evaluation::{
+    Distribution,
+    tables::{Cell, Table},
+};
+use nalgebra::Vector3;
+use serde::Serialize;
+use tracking::Stage;
+
+/// A limb that is farther off was lost, millimetres.
+const LOST_MM: f64 = 100.0;
+
+/// Joints that the body and the truth have in common.
+pub struct Joints {
+    /// indices in the rig and in the truth, and the name
+    pairs: Vec<(usize, usize, String)>,
+    left_out: Vec<String>,
+}
+
+/// Distances of joints in one frame, millimetres.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct JointErrors {
+    pub mean_mm: f64,
+    pub max_mm: f64,
+    pub worst_joint: String,
+}
+
+impl Joints {
+    /// By name.
+    pub fn new(model: &BodyModel, truth: &[(String, Vector3<f64>)]) -> anyhow::Result<Self> {
+        let (mut pairs, mut left_out) = (Vec::new(), Vec::new());
+        for (index, joint) in model.rig().joints().iter().enumerate() {
+            match truth.iter().position(|(name, _)| *name == joint.name) {
+                Some(other) => pairs.push((index, other, joint.name.clone())),
+                None => left_out.push(format!("{} (of the body)", joint.name)),
+            }
+        }
+        let is_left_out = |name: &String| model.rig().joint_index(name).is_none();
+        let others = truth.iter().map(|(name, _)| name).filter(|name| is_left_out(name));
+        left_out.extend(others.map(|name| format!("{name} (of the truth)")));
+        if pairs.is_empty() {
+            bail!("no true joint is called as one of the body's, expected names such as pelvis or l_elbow");
+        }
+        Ok(Self { pairs, left_out })
+    }
+
+    pub fn compare(&self, found: &[Vector3<f64>], truth: &[(String, Vector3<f64>)]) -> JointErrors {
+        let mut errors = JointErrors::default();
+        for (own, other, name) in &self.pairs {
+            let mm = 1000.0 * (found[*own] - truth[*other].1).norm();
+            errors.mean_mm += mm / self.pairs.len() as f64;
+            if mm > errors.max_mm {
+                (errors.max_mm, errors.worst_joint) = (mm, name.clone());
+            }
+        }
+        errors
+    }
+}
+
+/// What is known of one frame.
+#[derive(Serialize)]
+pub struct FrameReport {
+    pub frame: u32,
+    pub stage: &'static str,
+    #[serde(flatten)]
+    pub errors: JointErrors,
+    pub iou: f64,
+    pub misaligned: Vec<String>,
+    pub limb_error_mm: f64,
+    pub effective_sample_size: Option<f64>,
+    pub prepare_ms: f64,
+    pub track_ms: f64,
+    pub local_only: JointErrors,
+    pub local_only_iou: f64,
+    pub kept: JointErrors,
+}
+
+pub fn stage(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Unseen => "unseen",
+        Stage::Local => "local",
+        Stage::Particles => "particles",
+        Stage::Misaligned => "misaligned",
+    }
+}
+
+/// Times that belong to no frame.
+#[derive(Default)]
+pub struct Times {
+    /// finding pose and shape in the first frame, seconds
+    pub start_s: f64,
+    /// searches over all DOFs whose result wasn't used, milliseconds
+    pub search_ms: Vec<f64>,
+}
+
+#[derive(Serialize)]
+pub struct Settings {
+    pub cameras: Vec<String>,
+    pub noise_seed: Option<u64>,
+    pub prior_poses: usize,
+    pub prior_is_recorded: bool,
+    pub alpha: Vec<f64>,
+}
+
+#[derive(Serialize)]
+struct Stages {
+    local: usize,
+    particles: usize,
+    misaligned: usize,
+    unseen: usize,
+}
+
+/// Mean and largest distance of joints over all frames, millimetres, and the silhouettes' overlap.
+#[derive(Serialize)]
+struct Baseline {
+    joint_mean_mm: f64,
+    joint_max_mm: f64,
+    frames_lost: usize,
+    iou_mean: Option<f64>,
+}
+
+#[derive(Serialize)]
+pub struct Report {
+    joint_mean_mm: f64,
+    joint_max_mm: f64,
+    misaligned_frames: usize,
+    iou_mean: f64,
+    /// of a frame without particles: preparation, local optimisation, judging; mean
+    local_ms_per_frame: Option<f64>,
+    /// what particles and the local optimisation after them add to a frame that they are used in, mean; where they never were, one
+    /// search over all DOFs
+    global_ms_per_frame: Option<f64>,
+    frames: usize,
+    /// frames with a joint that is more than 100 mm off
+    frames_lost: usize,
+    joints_left_out: Vec<String>,
+    stages: Stages,
+    /// how `global_ms_per_frame` was measured
+    global_is_from: &'static str,
+    local_ms: Option<Distribution>,
+    prepare_ms: Option<Distribution>,
+    /// of one search over all DOFs
+    search_ms: Option<Distribution>,
+    initialisation_s: f64,
+    local_only: Baseline,
+    first_pose_kept: Baseline,
+    #[serde(flatten)]
+    settings: Settings,
+    per_frame: Vec<FrameReport>,
+}
+
+fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+    Distribution::of(numbers).map(|numbers| numbers.mean)
+}
+
+fn baseline(
+    frames: &[FrameReport],
+    errors: impl Fn(&FrameReport) -> &JointErrors,
+    iou: Option<f64>,
+) -> Baseline {
+    let lost = frames.iter().filter(|frame| errors(frame).max_mm > LOST_MM);
+    Baseline {
+        joint_mean_mm: mean(frames.iter().map(|frame| errors(frame).mean_mm)).unwrap_or_default(),
+        joint_max_mm: frames.iter().map(|frame| errors(frame).max_mm).fold(0.0, f64::max),
+        frames_lost: lost.count(),
+        iou_mean: iou,
+    }
+}
+
+impl Report {
+    pub fn new(joints: Joints, frames: Vec<FrameReport>, times: &Times, settings: Settings) -> Self {
+        let all = |frame: &FrameReport| frame.prepare_ms + frame.track_ms;
+        let of = |stage: &'static str| frames.iter().filter(move |frame| frame.stage == stage);
+        let local_ms = Distribution::of(of("local").map(all));
+        let searched: Vec<f64> = frames
+            .iter()
+            .filter(|frame| frame.effective_sample_size.is_some())
+            .map(|frame| all(frame) - local_ms.map_or(0.0, |local| local.mean))
+            .collect();
+        let (times_of, global_is_from) = if searched.is_empty() {
+            (&times.search_ms, "searches over all DOFs, whose result was not used")
+        } else {
+            (&searched, "frames with particles, less the mean of those without")
+        };
+        let own = baseline(&frames, |frame| &frame.errors, mean(frames.iter().map(|frame| frame.iou)));
+        let alone = mean(frames.iter().map(|frame| frame.local_only_iou));
+        Self {
+            joint_mean_mm: own.joint_mean_mm,
+            joint_max_mm: own.joint_max_mm,
+            misaligned_frames: of("misaligned").count(),
+            iou_mean: own.iou_mean.unwrap_or_default(),
+            local_ms_per_frame: local_ms.map(|local| local.mean),
+            global_ms_per_frame: mean(times_of.iter().copied()),
+            frames: frames.len(),
+            frames_lost: own.frames_lost,
+            joints_left_out: joints.left_out,
+            stages: Stages {
+                local: of("local").count(),
+                particles: of("particles").count(),
+                misaligned: of("misaligned").count(),
+                unseen: of("unseen").count(),
+            },
+            global_is_from,
+            local_ms,
+            prepare_ms: Distribution::of(frames.iter().map(|frame| frame.prepare_ms)),
+            search_ms: Distribution::of(times.search_ms.iter().copied()),
+            initialisation_s: times.start_s,
+            local_only: baseline(&frames, |frame| &frame.local_only, alone),
+            first_pose_kept: baseline(&frames, |frame| &frame.kept, None),
+            settings,
+            per_frame: frames,
+        }
+    }
+
+    pub fn print(&self) {
+        let Self { stages, local_only, first_pose_kept, .. } = self;
+        let columns = ["", "Marey", "local only", "first pose kept", "paper"];
+        let mut table = Table::new("", "", 1, columns);
+        let row = |name: &str, [own, local, kept]: [Cell; 3], paper: &str| {
+            vec![Cell::text(name), own, local, kept, Cell::text(paper)]
+        };
+        let mm = |value: f64| Cell::text(format!("{value:.1} mm"));
+        let baselines = [local_only, first_pose_kept];
+        let [a, b] = baselines.map(|other| mm(other.joint_mean_mm));
+        table.push(row("joints, mean", [mm(self.joint_mean_mm), a, b], ""));
+        let [a, b] = baselines.map(|other| mm(other.joint_max_mm));
+        table.push(row("joints, largest", [mm(self.joint_max_mm), a, b], ""));
+        let count = |count: usize| Cell::text(count.to_string());
+        let [a, b] = baselines.map(|other| count(other.frames_lost));
+        table.push(row("frames with a joint off by > 100 mm", [count(self.frames_lost), a, b], ""));
+        let iou = Cell::maybe(local_only.iou_mean, 3);
+        table.push(row("overlap (IoU), mean", [Cell::Number(self.iou_mean, 3), iou, Cell::Empty], ""));
+        let ms = |value: Option<f64>| value.map_or(Cell::Empty, |ms| Cell::text(format!("{ms:.0} ms")));
+        let [none, nothing] = [Cell::Empty, Cell::Empty];
+        table.push(row("local step, a frame", [ms(self.local_ms_per_frame), none, nothing], "8-10 s"));
+        let [none, nothing] = [Cell::Empty, Cell::Empty];
+        table.push(row("particles, a frame", [ms(self.global_ms_per_frame), none, nothing], "180-300 s"));
+        print!("{}", table.text());
+        println!(
+            "\n{} frames, {} views: {} local, {} fixed by particles, {} misaligned, {} without anybody",
+            self.frames,
+            self.settings.cameras.len(),
+            stages.local,
+            stages.particles,
+            stages.misaligned,
+            stages.unseen
+        );
+        println!("particles measured in: {}", self.global_is_from);
+        for (name, times) in
+            [("a frame without particles", self.local_ms), ("one search over all DOFs", self.search_ms)]
+        {
+            if let Some(Distribution { median, percentile_90, .. }) = times {
+                println!("{name}: median {median:.0} ms, 90 % within {percentile_90:.0} ms");
+            }
+        }
+        if !self.joints_left_out.is_empty() {
+            println!("joints left out: {}", self.joints_left_out.join(", "));
+        }
+        let worst = self.per_frame.iter().max_by(|a, b| a.errors.max_mm.total_cmp(&b.errors.max_mm));
+        if let Some(FrameReport { frame, errors: JointErrors { worst_joint, max_mm, .. }, .. }) = worst {
+            println!("worst: {worst_joint} in frame {frame}, {max_mm:.0} mm");
+        }
+        println!("(paper: no true joints, its own captures, 8 views, two cores of 3 GHz of 2008)");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn truth(names: &[&str]) -> Vec<(String, Vector3<f64>)> {
+        names.iter().map(|name| ((*name).to_owned(), Vector3::zeros())).collect()
+    }
+
+    #[test]
+    fn joints_are_compared_by_name_and_those_without_a_counterpart_are_listed() {
+        let model = BodyModel::shipped();
+        let truth = truth(&["nose", "l_elbow", "pelvis"]);
+        let joints = Joints::new(&model, &truth).unwrap();
+        assert!(joints.left_out.contains(&"nose (of the truth)".to_owned()));
+        assert!(joints.left_out.contains(&"r_elbow (of the body)".to_owned()));
+        assert_eq!(joints.left_out.len(), model.rig().num_joints() - 2 + 1);
+        let mut found = vec![Vector3::zeros(); model.rig().num_joints()];
+        found[model.rig().joint_index("l_elbow").unwrap()].x = 0.02;
+        // a joint that isn't compared
+        found[model.rig().joint_index("head").unwrap()].x = 9.0;
+        let errors = joints.compare(&found, &truth);
+        assert!((errors.mean_mm - 10.0).abs() < 1e-9 && (errors.max_mm - 20.0).abs() < 1e-9);
+        assert_eq!(errors.worst_joint, "l_elbow");
+    }
+
+    #[test]
+    fn no_joint_in_common_is_refused() {
+        assert!(Joints::new(&BodyModel::shipped(), &truth(&["nose"])).is_err());
+    }
+
+    fn frame(stage: &'static str, track_ms: f64, searched: bool) -> FrameReport {
+        FrameReport {
+            frame: 0,
+            stage,
+            errors: JointErrors {
+                mean_mm: 5.0,
+                max_mm: if searched { 120.0 } else { 9.0 },
+                worst_joint: String::new(),
+            },
+            iou: 0.95,
+            misaligned: Vec::new(),
+            limb_error_mm: 1.0,
+            effective_sample_size: searched.then_some(8.0),
+            prepare_ms: 10.0,
+            track_ms,
+            local_only: JointErrors::default(),
+            local_only_iou: 0.9,
+            kept: JointErrors::default(),
+        }
+    }
+
+    #[test]
+    fn what_particles_take_is_what_they_add_to_a_frame_or_a_search_of_its_own() {
+        let report = |frames| {
+            let joints = Joints { pairs: Vec::new(), left_out: Vec::new() };
+            let settings = Settings {
+                cameras: Vec::new(),
+                noise_seed: None,
+                prior_poses: 3,
+                prior_is_recorded: false,
+                alpha: Vec::new(),
+            };
+            Report::new(joints, frames, &Times { start_s: 1.0, search_ms: vec![300.0] }, settings)
+        };
+        let local = || vec![frame("local", 50.0, false), frame("local", 70.0, false)];
+        let without = report(local());
+        assert_eq!((without.local_ms_per_frame, without.global_ms_per_frame), (Some(70.0), Some(300.0)));
+        let mut frames = local();
+        frames.push(frame("particles", 460.0, true));
+        let with = report(frames);
+        assert_eq!((with.local_ms_per_frame, with.global_ms_per_frame), (Some(70.0), Some(400.0)));
+        assert_eq!((with.frames_lost, with.stages.particles, with.misaligned_frames), (1, 1, 0));
+        let json = serde_json::to_value(&with).unwrap();
+        for key in [
+            "joint_mean_mm",
+            "joint_max_mm",
+            "misaligned_frames",
+            "iou_mean",
+            "local_ms_per_frame",
+            "global_ms_per_frame",
+            "frames",
+        ] {
+            assert!(json[key].is_number(), "{key}");
+        }
+    }
+}
