@@ -3,17 +3,19 @@ use rayon::prelude::*;
 
 /// How often centres move to the middle of what is nearest to them.
 const ROUNDS: usize = 4;
+/// Share of the poses that lie nearer to the centres than the one that becomes the next: the farthest are odd ones.
+const FAR: f64 = 0.95;
 /// Poses of a cluster among which its middle is looked for.
 const CANDIDATES: usize = 200;
 
-/// Indices of `count` poses, increasing, that stand for all: k-medoids over the angles (the root doesn't count), from the k
-/// centres that are farthest from each other (Gonzalez 1985). Centres alone would be the oddest poses that there are. Nothing is
-/// drawn at random.
+/// Indices of `count` poses, increasing, that stand for all: k-medoids over the angles (the root doesn't count), from centres that
+/// are far from each other. As in the k-centre method (Gonzalez 1985) every centre is far from all before it; but the farthest
+/// 5 % are passed over, or each odd pose would stand for itself. Nothing is drawn at random.
 pub fn covering<P: AsRef<[f64]> + Sync>(poses: &[P], count: usize) -> Vec<usize> {
     if poses.len() <= count || count == 0 {
         return (0..poses.len().min(count)).collect();
     }
-    let mut centres = farthest(poses, count);
+    let mut centres = far_apart(poses, count);
     for _ in 0..ROUNDS {
         let nearest: Vec<usize> = poses
             .par_iter()
@@ -43,8 +45,8 @@ pub fn covering<P: AsRef<[f64]> + Sync>(poses: &[P], count: usize) -> Vec<usize>
     centres
 }
 
-/// The pose nearest to the mean, then always the one farthest from all before it.
-fn farthest<P: AsRef<[f64]> + Sync>(poses: &[P], count: usize) -> Vec<usize> {
+/// The pose nearest to the mean, then always one that is far from all before it.
+fn far_apart<P: AsRef<[f64]> + Sync>(poses: &[P], count: usize) -> Vec<usize> {
     let width = poses[0].as_ref().len();
     let mut mean = vec![0.0; width];
     for pose in poses {
@@ -52,13 +54,17 @@ fn farthest<P: AsRef<[f64]> + Sync>(poses: &[P], count: usize) -> Vec<usize> {
     }
     let mut centres = vec![least(poses.iter().map(|pose| squared(pose.as_ref(), &mean))).0];
     let mut distances = vec![f64::INFINITY; poses.len()];
+    let mut order: Vec<usize> = (0..poses.len()).collect();
+    let next = ((poses.len() - 1) as f64 * FAR) as usize;
     while centres.len() < count {
         let last = poses[centres[centres.len() - 1]].as_ref();
         distances
             .par_iter_mut()
             .zip(poses)
             .for_each(|(distance, pose)| *distance = distance.min(squared(pose.as_ref(), last)));
-        centres.push(least(distances.iter().map(|distance| -distance)).0);
+        let by_distance = |a: &usize, b: &usize| distances[*a].total_cmp(&distances[*b]).then(a.cmp(b));
+        let (_, &mut far, _) = order.select_nth_unstable_by(next, by_distance);
+        centres.push(far);
     }
     centres
 }
@@ -71,7 +77,8 @@ fn least(numbers: impl Iterator<Item = f64>) -> (usize, f64) {
     )
 }
 
-fn squared(a: &[f64], b: &[f64]) -> f64 {
+/// Squared distance of two poses' angles.
+pub fn squared(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).skip(ROOT_DOFS).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 

@@ -4,12 +4,14 @@ use model::Motion;
 use motion_db::MotionDatabase;
 use rayon::prelude::*;
 
-use crate::{Error, Result, covering};
+use crate::{Error, Result, covering, covering::squared};
 
 /// Poses of recordings are taken so far apart, seconds: a fifth of a second later people are in another pose.
 const EVERY_S: f64 = 0.2;
 /// Most poses that are chosen from: what choosing takes grows with their square.
 const MOST: usize = 12_000;
+/// One in so many more is chosen first, and the loneliest left out.
+const SPARE: usize = 5;
 
 /// The poses of recordings on the body, in their order, 0.2 s apart: root, and angles within the rig's limits. Every recording
 /// has a name, for messages. Recordings are brought to the body on all cores; the result doesn't depend on how many there are.
@@ -62,7 +64,9 @@ pub fn database_poses(
     recorded_poses(model, &named)
 }
 
-/// So many poses that stand for all of `poses`, with the root at zero: the training poses of a Parzen prior.
+/// So many poses that stand for all of `poses`, with the root at zero: the training poses of a Parzen prior. Of a few more
+/// that do ([`covering`]), those that are loneliest are left out: the density's width is the largest distance of a training pose
+/// from its nearest neighbour, and one odd pose would make it flat.
 ///
 /// # Errors
 /// [`Error::TooFew`] if there are not so many.
@@ -72,11 +76,21 @@ pub fn training_poses(poses: &[Vec<f64>], count: usize) -> Result<Vec<Vec<f64>>>
     }
     let every = poses.len().div_ceil(MOST).max(1);
     let thinned: Vec<&[f64]> = poses.iter().step_by(every).map(Vec::as_slice).collect();
-    let chosen = covering(&thinned, count);
-    let without_root = |pose: &[f64]| {
-        let mut pose = pose.to_vec();
-        pose.iter_mut().take(ROOT_DOFS).for_each(|x| *x = 0.0);
-        pose
-    };
-    Ok(chosen.into_iter().map(|index| without_root(thinned[index])).collect())
+    let mut chosen: Vec<Vec<f64>> = covering(&thinned, count + count / SPARE)
+        .into_iter()
+        .map(|index| {
+            let mut pose = thinned[index].to_vec();
+            pose.iter_mut().take(ROOT_DOFS).for_each(|x| *x = 0.0);
+            pose
+        })
+        .collect();
+    while chosen.len() > count {
+        let nearest = |i: usize| {
+            let others = chosen.iter().enumerate().filter(|(j, _)| *j != i);
+            others.map(|(_, other)| squared(&chosen[i], other)).fold(f64::INFINITY, f64::min)
+        };
+        let loneliest = (0..chosen.len()).max_by(|&a, &b| nearest(a).total_cmp(&nearest(b)));
+        chosen.remove(loneliest.unwrap_or(0));
+    }
+    Ok(chosen)
 }

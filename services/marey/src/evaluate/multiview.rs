@@ -1,7 +1,9 @@
 //! `marey evaluate multiview`.
 
 mod film;
+mod joints;
 mod report;
+mod texture;
 
 use std::{
     path::{Path, PathBuf},
@@ -14,6 +16,7 @@ use body::BodyModel;
 use indicatif::{ProgressBar, ProgressStyle};
 use model::{Camera, Silhouette};
 use motion_db::Clip;
+use nalgebra::Vector3;
 use pose_prior::training_poses;
 use shape_fit::{Fit, fit};
 use tracking::{ObservedFrame, Options, Part, ParticleOptions, Tracked, Tracker, built_in_poses};
@@ -21,13 +24,15 @@ use vision::scene::SilhouetteNoise;
 
 use super::{capture::Folder, motions, recovery, shape, written::write};
 use film::Film;
-use report::{FrameReport, Joints, Report, Settings, Times};
+use joints::{JointErrors, Joints};
+use report::{FrameReport, Report, Settings, Times};
+use texture::Texture;
 
 /// `marey evaluate multiview`
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png and groundtruth/joints.json; images/CAMERA/0000.jpg, where \
-there are any, are the ground of the overlays. The body's shape and its first pose are found in the first frame, without a start given; \
+there are any, show points of the person that are found again, and are the ground of the overlays. The body's shape and its first pose are found in the first frame, without a start given; \
 then it is followed from frame to frame.
 
   marey evaluate multiview captures/man/ --json errors.json
@@ -46,6 +51,9 @@ pub struct Args {
     /// Turn over 1.2 % of the pixels and add blobs and holes, with this seed
     #[arg(long, value_name = "SEED", num_args = 0..=1, default_missing_value = "1")]
     noise: Option<u64>,
+    /// Use silhouettes alone, even where there are pictures
+    #[arg(long)]
+    no_texture: bool,
     /// Make the prior of particles of these recordings: ASF+AMC of the CMU skeleton, also .zst or .gz [default: built-in poses]
     #[arg(long, num_args = 1.., value_name = "DIR")]
     prior_from: Vec<PathBuf>,
@@ -92,13 +100,22 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let found: Fit = found.with_context(|| format!("frame {first} of {}", args.folder.display()))?;
     let mut run = Run::new(&model, &found, &training, args)?;
     run.times.start_s = started.elapsed().as_secs_f64();
+    let mut texture = (!args.no_texture).then(|| Texture::new(folder.cameras.len()));
     let mut film =
         args.overlay.as_deref().map(|to| Film::create(to, &model, &found, &folder, args.rate)).transpose()?;
     let mut reports = Vec::new();
     for (index, &number) in frames.iter().enumerate() {
         let views = seen(&folder, number, args.noise)?;
-        let (tracked, mut report) = run.frame(index, number, &views, &joints, &folder.joints(number)?)?;
-        report.kept = joints.compare(&found.joints, &folder.joints(number)?);
+        let started = Instant::now();
+        let mut observed = ObservedFrame::new(index, &views)?;
+        let prepare_ms = ms(started);
+        if let Some(texture) = &mut texture {
+            observed = texture.add(observed, &folder, number, &views)?;
+        }
+        let truth = folder.joints(number)?;
+        let (tracked, mut report) = run.frame(&observed, &joints, &truth)?;
+        (report.frame, report.prepare_ms) = (number, prepare_ms);
+        report.kept = joints.compare(&found.joints, &truth);
         bar.set_message(format!("{:.0} mm", report.errors.mean_mm));
         if let Some(film) = &mut film {
             film.add(&folder, number, &views, &tracked)?;
@@ -109,6 +126,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     bar.finish_and_clear();
     if let Some(film) = film {
         film.finish()?;
+    }
+    if let Some(texture) = texture {
+        run.times.features_ms = texture.ms;
+        run.times.matches = texture.matches;
     }
     let settings = Settings {
         cameras: folder.cameras.iter().map(|camera| camera.name.clone()).collect(),
@@ -174,39 +195,34 @@ impl<'a> Run<'a> {
 
     fn frame(
         &mut self,
-        index: usize,
-        number: u32,
-        views: &[(Camera, Silhouette)],
+        frame: &ObservedFrame,
         joints: &Joints,
-        truth: &[(String, nalgebra::Vector3<f64>)],
+        truth: &[(String, Vector3<f64>)],
     ) -> anyhow::Result<(Tracked, FrameReport)> {
         let stop = AtomicBool::new(false);
         let started = Instant::now();
-        let frame = ObservedFrame::new(index, views)?;
-        let prepare_ms = ms(started);
-        let started = Instant::now();
-        let tracked = self.tracker.track(&frame, &stop)?;
+        let tracked = self.tracker.track(frame, &stop)?;
         let track_ms = ms(started);
-        let alone = self.without_particles.track(&frame, &stop)?;
-        if self.time_search_every > 0 && index % self.time_search_every == 0 {
-            let misalignment = self.idle.misalignment(&frame, &tracked.pose);
+        let alone = self.without_particles.track(frame, &stop)?;
+        if self.time_search_every > 0 && frame.index % self.time_search_every == 0 {
+            let misalignment = self.idle.misalignment(frame, &tracked.pose);
             let started = Instant::now();
-            self.idle.search(&frame, &tracked.pose, &tracked.pose, &misalignment, &|| true);
+            self.idle.search(frame, &tracked.pose, &tracked.pose, &misalignment, &|| true);
             self.times.search_ms.push(ms(started));
         }
         let report = FrameReport {
-            frame: number,
+            frame: 0,
             stage: report::stage(tracked.stage),
             errors: joints.compare(&tracked.joints, truth),
             iou: tracked.mean_iou(),
             misaligned: tracked.misalignment.misaligned().map(|limb| format!("{limb:?}")).collect(),
             limb_error_mm: 1000.0 * tracked.misalignment.worst_m(),
             effective_sample_size: tracked.effective_sample_size,
-            prepare_ms,
+            prepare_ms: 0.0,
             track_ms,
             local_only: joints.compare(&alone.joints, truth),
             local_only_iou: alone.mean_iou(),
-            kept: report::JointErrors::default(),
+            kept: JointErrors::default(),
         };
         Ok((tracked, report))
     }

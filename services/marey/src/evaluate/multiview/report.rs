@@ -1,64 +1,16 @@
 //! What was measured, as a table and as JSON.
 
-use anyhow::bail;
-use body::BodyModel;
 use evaluation::{
     Distribution,
     tables::{Cell, Table},
 };
-use nalgebra::Vector3;
 use serde::Serialize;
 use tracking::Stage;
 
+use super::joints::{JointErrors, Joints};
+
 /// A limb that is farther off was lost, millimetres.
 const LOST_MM: f64 = 100.0;
-
-/// Joints that the body and the truth have in common.
-pub struct Joints {
-    /// indices in the rig and in the truth, and the name
-    pairs: Vec<(usize, usize, String)>,
-    left_out: Vec<String>,
-}
-
-/// Distances of joints in one frame, millimetres.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct JointErrors {
-    pub mean_mm: f64,
-    pub max_mm: f64,
-    pub worst_joint: String,
-}
-
-impl Joints {
-    /// By name.
-    pub fn new(model: &BodyModel, truth: &[(String, Vector3<f64>)]) -> anyhow::Result<Self> {
-        let (mut pairs, mut left_out) = (Vec::new(), Vec::new());
-        for (index, joint) in model.rig().joints().iter().enumerate() {
-            match truth.iter().position(|(name, _)| *name == joint.name) {
-                Some(other) => pairs.push((index, other, joint.name.clone())),
-                None => left_out.push(format!("{} (of the body)", joint.name)),
-            }
-        }
-        let is_left_out = |name: &String| model.rig().joint_index(name).is_none();
-        let others = truth.iter().map(|(name, _)| name).filter(|name| is_left_out(name));
-        left_out.extend(others.map(|name| format!("{name} (of the truth)")));
-        if pairs.is_empty() {
-            bail!("no true joint is called as one of the body's, expected names such as pelvis or l_elbow");
-        }
-        Ok(Self { pairs, left_out })
-    }
-
-    pub fn compare(&self, found: &[Vector3<f64>], truth: &[(String, Vector3<f64>)]) -> JointErrors {
-        let mut errors = JointErrors::default();
-        for (own, other, name) in &self.pairs {
-            let mm = 1000.0 * (found[*own] - truth[*other].1).norm();
-            errors.mean_mm += mm / self.pairs.len() as f64;
-            if mm > errors.max_mm {
-                (errors.max_mm, errors.worst_joint) = (mm, name.clone());
-            }
-        }
-        errors
-    }
-}
 
 /// What is known of one frame.
 #[derive(Serialize)]
@@ -94,6 +46,10 @@ pub struct Times {
     pub start_s: f64,
     /// searches over all DOFs whose result wasn't used, milliseconds
     pub search_ms: Vec<f64>,
+    /// finding points in the pictures of a frame and matching them, milliseconds
+    pub features_ms: Vec<f64>,
+    /// points found again, in all
+    pub matches: usize,
 }
 
 #[derive(Serialize)]
@@ -144,6 +100,10 @@ pub struct Report {
     prepare_ms: Option<Distribution>,
     /// of one search over all DOFs
     search_ms: Option<Distribution>,
+    /// of the frames with pictures: finding points and matching them; not part of `local_ms_per_frame`
+    features_ms: Option<Distribution>,
+    /// points that cameras found again, in all frames
+    matches: usize,
     initialisation_s: f64,
     local_only: Baseline,
     first_pose_kept: Baseline,
@@ -207,6 +167,8 @@ impl Report {
             local_ms,
             prepare_ms: Distribution::of(frames.iter().map(|frame| frame.prepare_ms)),
             search_ms: Distribution::of(times.search_ms.iter().copied()),
+            features_ms: Distribution::of(times.features_ms.iter().copied()),
+            matches: times.matches,
             initialisation_s: times.start_s,
             local_only: baseline(&frames, |frame| &frame.local_only, alone),
             first_pose_kept: baseline(&frames, |frame| &frame.kept, None),
@@ -249,12 +211,18 @@ impl Report {
             stages.unseen
         );
         println!("particles measured in: {}", self.global_is_from);
-        for (name, times) in
-            [("a frame without particles", self.local_ms), ("one search over all DOFs", self.search_ms)]
-        {
+        let times = [
+            ("a frame without particles", self.local_ms),
+            ("one search over all DOFs", self.search_ms),
+            ("points in the pictures of a frame", self.features_ms),
+        ];
+        for (name, times) in times {
             if let Some(Distribution { median, percentile_90, .. }) = times {
                 println!("{name}: median {median:.0} ms, 90 % within {percentile_90:.0} ms");
             }
+        }
+        if self.matches > 0 {
+            println!("{} points of pictures found again", self.matches);
         }
         if !self.joints_left_out.is_empty() {
             println!("joints left out: {}", self.joints_left_out.join(", "));
@@ -270,32 +238,6 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn truth(names: &[&str]) -> Vec<(String, Vector3<f64>)> {
-        names.iter().map(|name| ((*name).to_owned(), Vector3::zeros())).collect()
-    }
-
-    #[test]
-    fn joints_are_compared_by_name_and_those_without_a_counterpart_are_listed() {
-        let model = BodyModel::shipped();
-        let truth = truth(&["nose", "l_elbow", "pelvis"]);
-        let joints = Joints::new(&model, &truth).unwrap();
-        assert!(joints.left_out.contains(&"nose (of the truth)".to_owned()));
-        assert!(joints.left_out.contains(&"r_elbow (of the body)".to_owned()));
-        assert_eq!(joints.left_out.len(), model.rig().num_joints() - 2 + 1);
-        let mut found = vec![Vector3::zeros(); model.rig().num_joints()];
-        found[model.rig().joint_index("l_elbow").unwrap()].x = 0.02;
-        // a joint that isn't compared
-        found[model.rig().joint_index("head").unwrap()].x = 9.0;
-        let errors = joints.compare(&found, &truth);
-        assert!((errors.mean_mm - 10.0).abs() < 1e-9 && (errors.max_mm - 20.0).abs() < 1e-9);
-        assert_eq!(errors.worst_joint, "l_elbow");
-    }
-
-    #[test]
-    fn no_joint_in_common_is_refused() {
-        assert!(Joints::new(&BodyModel::shipped(), &truth(&["nose"])).is_err());
-    }
 
     fn frame(stage: &'static str, track_ms: f64, searched: bool) -> FrameReport {
         FrameReport {
@@ -321,7 +263,7 @@ mod tests {
     #[test]
     fn what_particles_take_is_what_they_add_to_a_frame_or_a_search_of_its_own() {
         let report = |frames| {
-            let joints = Joints { pairs: Vec::new(), left_out: Vec::new() };
+            let joints = Joints::default();
             let settings = Settings {
                 cameras: Vec::new(),
                 noise_seed: None,
@@ -329,7 +271,8 @@ mod tests {
                 prior_is_recorded: false,
                 alpha: Vec::new(),
             };
-            Report::new(joints, frames, &Times { start_s: 1.0, search_ms: vec![300.0] }, settings)
+            let times = Times { start_s: 1.0, search_ms: vec![300.0], ..Times::default() };
+            Report::new(joints, frames, &times, settings)
         };
         let local = || vec![frame("local", 50.0, false), frame("local", 70.0, false)];
         let without = report(local());
