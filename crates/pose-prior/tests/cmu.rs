@@ -7,7 +7,7 @@ use kinematics::{Kinematics, Parametrisation, control_points};
 use model::Motion;
 use motion_db::{Clip, MotionDatabase};
 use nalgebra::Vector3;
-use pose_prior::{Error, database_poses, recorded_poses, training_poses};
+use pose_prior::{Error, covering, database_poses, recorded_poses, training_poses};
 
 const TRIALS: [&str; 6] = ["13_17", "07_01", "16_35", "64_01", "49_02", "91_02"];
 
@@ -28,6 +28,13 @@ const BONES: [([&str; 2], [&str; 2]); 8] = [
     (["rfemur", "rtibia"], ["r_hip", "r_knee"]),
     (["rtibia", "rfoot"], ["r_knee", "r_ankle"]),
 ];
+
+/// Distance of a pose's angles from those of the nearest of others, radians.
+fn nearest(pose: &[f64], others: &[Vec<f64>]) -> f64 {
+    let squared =
+        |other: &Vec<f64>| -> f64 { pose[6..].iter().zip(&other[6..]).map(|(a, b)| (a - b).powi(2)).sum() };
+    others.iter().map(squared).fold(f64::INFINITY, f64::min).sqrt()
+}
 
 /// Directions of the bones in each 24th frame of a recording at 120 a second.
 fn directions(motion: &Motion) -> Vec<Vec<Vector3<f64>>> {
@@ -108,17 +115,20 @@ fn a_hundred_training_poses_are_near_to_all_that_people_did() {
     let training = training_poses(&poses, 100).unwrap();
     assert_eq!(training.len(), 100);
     assert!(training.iter().all(|pose| pose[..6] == [0.0; 6]));
-    let nearest = |pose: &Vec<f64>| {
-        let distance = |other: &Vec<f64>| -> f64 {
-            pose[6..].iter().zip(&other[6..]).map(|(a, b)| (a - b).powi(2)).sum()
-        };
-        training.iter().map(distance).fold(f64::INFINITY, f64::min).sqrt()
-    };
-    let mut distances: Vec<f64> = poses.iter().map(nearest).collect();
+    let mut distances: Vec<f64> = poses.iter().map(|pose| nearest(pose, &training)).collect();
     distances.sort_by(f64::total_cmp);
-    let [median, most] = [distances[distances.len() / 2], distances[distances.len() * 95 / 100]];
-    println!("{} poses: nearest training pose at {median:.2} rad, 95 % {most:.2} rad", poses.len());
+    let [median, most] = [5, 9].map(|tenth| distances[distances.len() * tenth / 10]);
+    println!("{} poses: nearest training pose at {median:.2} rad, 90 % {most:.2} rad", poses.len());
     assert!(median < 0.5 && most < 1.0, "{median} {most}");
+    // odd poses are left out, which makes the density narrower
+    let covering: Vec<_> = covering(&poses, 100).into_iter().map(|index| poses[index].clone()).collect();
+    let width = |poses: &[Vec<f64>]| {
+        let others = |i: usize| [&poses[..i], &poses[i + 1..]].concat();
+        (0..poses.len()).map(|i| nearest(&poses[i], &others(i))).fold(0.0, f64::max)
+    };
+    let [narrow, wide] = [width(&training), width(&covering)];
+    println!("width {narrow:.2} rad, with odd poses {wide:.2} rad");
+    assert!(narrow < 0.8 * wide, "{narrow} {wide}");
     assert_eq!(training, training_poses(&poses, 100).unwrap());
     assert!(matches!(training_poses(&poses[..50], 100), Err(Error::TooFew { found: 50, .. })));
 }

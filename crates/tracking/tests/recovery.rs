@@ -12,7 +12,7 @@ fn particles_find_arms_that_local_optimisation_does_not_whatever_the_number_of_t
     let model = BodyModel::shipped();
     let training = built_in_poses(&model);
     let cameras = Ring { cameras: 4, size: 502, focal: 663.0, ..Ring::default() }.cameras();
-    let poses: Vec<_> = training.iter().step_by(9).cloned().collect();
+    let poses: Vec<_> = training.iter().step_by(18).cloned().collect();
     let setting = Setting {
         model: &model,
         cameras: &cameras,
