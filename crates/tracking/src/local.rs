@@ -1,4 +1,4 @@
-//! Local optimisation: Levenberg–Marquardt over the pose with new correspondences at every step.
+//! Local optimisation: Gauss–Newton from coarse to fine over the pose with new correspondences at every step.
 
 use body::{BodyModel, Shape};
 use nalgebra::{DMatrix, DVector};
@@ -21,29 +21,29 @@ struct Step {
     weighting: Weighting,
     /// σ of the robust weight of points of the skin, metres
     texture_m: f64,
-    evaluations: usize,
+    moves: usize,
 }
 
-const fn step(
-    level: usize,
-    [scale_m, tangential, normal_m]: [f64; 3],
-    texture_m: f64,
-    evaluations: usize,
-) -> Step {
-    Step { level, weighting: Weighting { scale_m, tangential, normal_m }, texture_m, evaluations }
+const fn step(level: usize, [scale_m, tangential, normal_m]: [f64; 3], texture_m: f64, moves: usize) -> Step {
+    Step { level, weighting: Weighting { scale_m, tangential, normal_m }, texture_m, moves }
 }
 
 /// Limbs move by up to 20 cm from frame to frame: far first, then exactly.
 const STEPS: [Step; 5] = [
-    step(0, [0.25, 0.5, 0.15], 0.04, 3),
-    step(0, [0.12, 0.3, 0.10], 0.025, 4),
-    step(0, [0.06, 0.1, 0.06], 0.015, 4),
-    step(0, [0.03, 0.03, 0.05], 0.01, 4),
-    step(1, [0.02, 0.01, 0.04], 0.008, 3),
+    step(0, [0.25, 0.5, 0.15], 0.04, 2),
+    step(0, [0.12, 0.3, 0.10], 0.025, 2),
+    step(0, [0.06, 0.1, 0.06], 0.015, 2),
+    step(0, [0.03, 0.03, 0.05], 0.01, 2),
+    step(1, [0.02, 0.01, 0.04], 0.008, 2),
 ];
 /// Standard deviations of angles and of twists about the prediction, radians: wide, for what no silhouette tells.
 const ANGLE: f64 = 0.5;
 const TWIST: f64 = 0.25;
+/// Index of the step that is descended; in those before it, moves are made whether the energy becomes less or not: with new pairs
+/// each time it is another energy anyway.
+const LAST: usize = STEPS.len() - 1;
+/// Share that is added to the diagonal of the matrix.
+const DAMPING: f64 = 1e-3;
 /// Steps are shortened so that no angle (radians) or coordinate (metres) changes by more.
 const LONGEST: f64 = 0.4;
 /// Relative gain of energy below which a step is over.
@@ -97,15 +97,23 @@ impl Local {
                 best = Some((start.to_vec(), system));
             }
         }
-        let (mut pose, system) = best?;
-        let mut known = Some(system);
-        for step in &STEPS {
-            let system = known.take().unwrap_or_else(|| self.linearise(problem, &pose, step));
-            pose = self.descend(problem, pose, system, step, goes_on)?;
+        let (mut pose, mut system) = best?;
+        for (i, step) in STEPS[..LAST].iter().enumerate() {
+            for left in (0..step.moves).rev() {
+                if !goes_on() {
+                    return None;
+                }
+                let Some(next) = moved(&pose, &system, DAMPING) else { break };
+                // pairs are made for the move that comes, so none is looked at twice
+                let for_next = if left == 0 { &STEPS[i + 1] } else { step };
+                system = self.linearise(problem, &next, for_next);
+                pose = next;
+            }
         }
-        Some(pose)
+        self.descend(problem, pose, system, &STEPS[LAST], goes_on)
     }
 
+    /// Moves as long as that makes the energy less.
     fn descend(
         &mut self,
         problem: &Problem<'_>,
@@ -114,8 +122,8 @@ impl Local {
         step: &Step,
         goes_on: &dyn Fn() -> bool,
     ) -> Option<Vec<f64>> {
-        let (mut damping, mut refused) = (1e-3, 0);
-        for _ in 1..step.evaluations {
+        let mut damping = DAMPING;
+        for _ in 0..step.moves {
             if !goes_on() {
                 return None;
             }
@@ -130,10 +138,6 @@ impl Local {
                 }
             } else {
                 damping = (damping * 10.0).max(1e-2);
-                refused += 1;
-                if refused == 2 {
-                    break;
-                }
             }
         }
         Some(pose)
