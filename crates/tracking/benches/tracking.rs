@@ -3,11 +3,12 @@
 #[path = "../tests/moving/mod.rs"]
 mod moving;
 
-use body::BodyModel;
+use body::{BodyModel, Posed};
 use divan::Bencher;
+use model::{Camera, PointMatch};
 use moving::{Views, mixed, seen};
 use tracking::{Misalignment, ObservedFrame, Options, SilhouetteTerm, Tracker};
-use vision::{Topology, scene::Ring};
+use vision::{DepthBuffer, Topology, View, scene::Ring};
 
 fn main() {
     divan::main();
@@ -39,6 +40,37 @@ fn local_frame_of_8_views(bencher: Bencher) {
     bencher.bench_local(|| {
         tracker.restart(&before).unwrap();
         tracker.track(&ObservedFrame::new(0, &views).unwrap(), &false.into()).unwrap()
+    });
+}
+
+/// The same with 300 points in every view that were found again, each where it is seen.
+#[divan::bench]
+fn local_frame_of_8_views_with_texture(bencher: Bencher) {
+    let model = BodyModel::shipped();
+    let ([before, now], [_, views]) = moment(&model, 8);
+    let posed = [&before, &now].map(|pose| {
+        let mut posed = Posed::default();
+        model.shape(&[]).pose(&model, pose, &mut posed);
+        posed.vertices
+    });
+    let topology = Topology::new(model.faces(), model.num_vertices());
+    let matches_of = |camera: &Camera| -> Vec<PointMatch> {
+        let view = View::new(camera);
+        let mut depths = DepthBuffer::new();
+        depths.draw(&view, &posed[0], &topology);
+        let seen = (0..model.num_vertices()).filter(|&vertex| depths.sees(&view, &posed[0][vertex], 0.002));
+        let pixel = |moment: usize, vertex: usize| view.project(&posed[moment][vertex]).unwrap().0;
+        let point = |vertex| PointMatch { frames_back: 1, before: pixel(0, vertex), now: pixel(1, vertex) };
+        seen.step_by(8).take(300).map(point).collect()
+    };
+    let matches: Vec<_> = views.iter().map(|(camera, _)| matches_of(camera)).collect();
+    let options = Options { particles: None, ..Options::default() };
+    let mut tracker = Tracker::new(&model, &[], &before, options).unwrap();
+    bencher.bench_local(|| {
+        tracker.restart_at(0, &before).unwrap();
+        let frame = ObservedFrame::new(1, &views).unwrap();
+        let with = |frame: ObservedFrame, (camera, of): (usize, &Vec<_>)| frame.with_matches(camera, of);
+        tracker.track(&matches.iter().enumerate().fold(frame, with), &false.into()).unwrap()
     });
 }
 

@@ -6,7 +6,7 @@ use body::{BodyModel, Posed, Shape};
 use model::{Camera, Silhouette};
 use nalgebra::Vector3;
 
-use crate::{Error, ObservedFrame, Result, Tracked, Tracker, blended};
+use crate::{Error, ObservedFrame, Result, Tracked, Tracker, blended, predict::unwind};
 
 /// Chunks that put a joint more than this apart where they meet do not agree, metres: one of them lost the person.
 const AGREE_M: f64 = 0.08;
@@ -93,7 +93,8 @@ pub struct Merged {
 }
 
 /// Puts chunks of one person together, in the order of their frames. Where two have frames in common and agree, poses go over
-/// from one to the other smoothly; quality is that of the chunk with the larger share.
+/// from one to the other smoothly; quality is that of the chunk with the larger share. The root's rotation vector goes on without
+/// jumps of whole turns.
 ///
 /// # Errors
 /// [`Error::Gap`] if frames are missing between two chunks.
@@ -130,6 +131,11 @@ pub fn merge(model: &BodyModel, shape: &Shape, chunks: &[Chunk]) -> Result<Merge
             }
         }
         merged.frames.extend(chunk.frames.iter().skip(common).cloned());
+    }
+    // each chunk counts whole turns from its own key frame
+    for i in 1..merged.frames.len() {
+        let (before, here) = merged.frames.split_at_mut(i);
+        unwind(&mut here[0].pose, &before[i - 1].pose);
     }
     Ok(merged)
 }

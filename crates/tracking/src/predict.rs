@@ -32,6 +32,24 @@ pub fn blended(a: &[f64], b: &[f64], share: f64) -> Vec<f64> {
     pose
 }
 
+/// Gives the root's rotation vector the whole turns that bring it nearest to that of the frame before, so that a person who turns
+/// round has no jump at half a turn. (Who leans, and so turns about no single axis, has one near a whole turn, where rotation vectors
+/// have their pole.) Where the rotation is the identity any axis will do, and the vector before says which.
+pub fn unwind(pose: &mut [f64], before: &[f64]) {
+    let (vector, last) = (rotation_log(&rotation_of(pose)), Vector3::new(before[3], before[4], before[5]));
+    let angle = vector.norm();
+    let axis = if angle > 1e-6 { vector / angle } else { last.try_normalize(1e-6).unwrap_or_default() };
+    let turns = ((axis.dot(&last) - angle) / std::f64::consts::TAU).round();
+    pose[3..ROOT_DOFS].copy_from_slice((axis * (angle + turns * std::f64::consts::TAU)).as_slice());
+}
+
+/// The same pose with a rotation vector of at most half a turn.
+pub fn wound(pose: &[f64]) -> Vec<f64> {
+    let mut wound = pose.to_vec();
+    set_rotation(&mut wound, &rotation_of(pose));
+    wound
+}
+
 fn rotation_of(pose: &[f64]) -> Matrix3<f64> {
     rotation_exp(&Vector3::new(pose[3], pose[4], pose[5]))
 }
@@ -60,6 +78,35 @@ mod tests {
         // what jumped doesn't go on as fast
         let far = predicted(&model, &at(0.0), &at(3.0));
         assert!(turned(&far, 3.5) && (far[0] - 3.3).abs() < 1e-9, "{far:?}");
+    }
+
+    #[test]
+    fn rotation_vectors_go_on_round_and_round_where_the_person_does() {
+        for tilt in [0.0, 0.1] {
+            let mut before = vec![0.0, 0.0, 0.0, tilt, 2.9, 0.0];
+            for step in 1..120 {
+                let heading = Vector3::new(0.0, 2.9 + 0.13 * f64::from(step), 0.0);
+                let rotation = rotation_exp(&heading) * rotation_exp(&Vector3::new(tilt, 0.0, 0.0));
+                let mut pose = before.clone();
+                set_rotation(&mut pose, &rotation);
+                unwind(&mut pose, &before);
+                assert!((rotation_of(&pose) - rotation).amax() < 1e-9);
+                // no vector goes on past a whole turn that isn't about the same axis: there is the pole
+                let is_pole = Rotation3::from_matrix_unchecked(rotation).angle() < 0.3 && tilt > 0.0;
+                let moved = (pose[4] - before[4]).abs();
+                assert!(is_pole || moved < 0.4, "step {step}: {pose:?} after {before:?}");
+                assert!(
+                    (rotation_of(&wound(&pose)) - rotation).amax() < 1e-9 && wound(&pose)[4].abs() < 3.15
+                );
+                assert!(tilt > 0.0 || (pose[4] - heading.y).abs() < 1e-6, "step {step}: {pose:?}");
+                before = pose;
+            }
+        }
+        let mut still = vec![0.0; 6];
+        unwind(&mut still, &[0.0, 0.0, 0.0, 0.0, 6.2, 0.0]);
+        assert!((still[4] - std::f64::consts::TAU).abs() < 1e-9);
+        unwind(&mut still, &[0.0; 6]);
+        assert_eq!(still, [0.0; 6]);
     }
 
     #[test]

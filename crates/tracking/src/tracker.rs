@@ -13,6 +13,7 @@ use crate::{
     local::{Local, Problem},
     misalignment::Judge,
     particles::{Particles, Space},
+    predict::{unwind, wound},
     predicted,
 };
 
@@ -34,7 +35,8 @@ pub enum Stage {
 pub struct Tracked {
     /// number of the frame in the session
     pub frame: usize,
-    /// root translation (metres), rotation vector and angles (radians), shape `[dofs]`
+    /// root translation (metres), rotation vector and angles (radians), shape `[dofs]`; the vector goes on beyond half a turn,
+    /// with the whole turns that bring it nearest to that of the frame before
     pub pose: Vec<f64>,
     /// joints in their pose, metres, in the order of the model's rig
     pub joints: Vec<Vector3<f64>>,
@@ -81,6 +83,8 @@ pub struct Tracker<'a> {
     lifter: Lifter,
     before: Vec<f64>,
     last: Vec<f64>,
+    /// the last pose as it was told, with whole turns
+    told: Vec<f64>,
 }
 
 impl<'a> Tracker<'a> {
@@ -120,8 +124,9 @@ impl<'a> Tracker<'a> {
             judge: Judge::default(),
             particles: Particles::default(),
             lifter: Lifter::default(),
-            before: start.to_vec(),
-            last: start.to_vec(),
+            before: wound(start),
+            last: wound(start),
+            told: start.to_vec(),
         })
     }
 
@@ -131,14 +136,25 @@ impl<'a> Tracker<'a> {
     /// [`Error::Pose`] if it is of another rig.
     pub fn restart(&mut self, pose: &[f64]) -> Result<()> {
         check_pose(self.model, pose)?;
-        (self.before, self.last) = (pose.to_vec(), pose.to_vec());
+        (self.before, self.last) = (wound(pose), wound(pose));
+        self.told = pose.to_vec();
         self.lifter.forget();
         Ok(())
     }
 
     /// The pose of the last frame, shape `[dofs]`.
     pub fn pose(&self) -> &[f64] {
-        &self.last
+        &self.told
+    }
+
+    /// The same for a frame whose number is known, so that matches may lead back to it.
+    ///
+    /// # Errors
+    /// [`Error::Pose`] if it is of another rig.
+    pub fn restart_at(&mut self, frame: usize, pose: &[f64]) -> Result<()> {
+        self.restart(pose)?;
+        self.lifter.remember(frame, pose, &Misalignment::from_errors([0.0; 10], f64::INFINITY));
+        Ok(())
     }
 
     /// The model.
@@ -186,7 +202,7 @@ impl<'a> Tracker<'a> {
             }
             stage = if misalignment.any() { Stage::Misaligned } else { Stage::Particles };
         }
-        self.before = std::mem::replace(&mut self.last, pose);
+        self.before = std::mem::replace(&mut self.last, wound(&pose));
         if stage != Stage::Local {
             // from a wrong pose to a right one is no velocity
             self.before.clone_from(&self.last);
@@ -325,9 +341,12 @@ impl<'a> Tracker<'a> {
         let found: Vec<f64> = frame.views.par_iter().map(draw).collect();
         let mut ious = vec![None; frame.num_cameras()];
         frame.views.iter().zip(found).for_each(|(view, iou)| ious[view.camera] = Some(iou));
+        let mut pose = self.last.clone();
+        unwind(&mut pose, &self.told);
+        self.told.clone_from(&pose);
         Tracked {
             frame: frame.index,
-            pose: self.last.clone(),
+            pose,
             joints: joints.clone(),
             ious,
             misalignment,

@@ -93,7 +93,6 @@ fn judge(test: &str, case: &Case) {
     let frames: Vec<_> = (0..FRAMES).map(|frame| views(&folder, &cameras, frame, noise)).collect();
     let fit = shape_fit::fit(&model, &frames[0], &shape_fit::Options::default()).unwrap();
     let mut tracker = Tracker::new(&model, &fit.alpha, &fit.pose, Options::default()).unwrap();
-    let (mut before, mut times) = (Instant::now(), Vec::<(Stage, Duration)>::new());
     let matches: Vec<_> =
         cameras.iter().filter(|_| has_pictures).map(|camera| matches(&folder, camera, &frames)).collect();
     let count: usize = matches.iter().flatten().map(Vec::len).sum();
@@ -105,6 +104,7 @@ fn judge(test: &str, case: &Case) {
         };
         Ok(matches.iter().enumerate().fold(frame, with))
     };
+    let (mut before, mut times) = (Instant::now(), Vec::<(Stage, Duration)>::new());
     let observed = frames.iter().enumerate().map(prepare);
     let chunk = track_frames(&mut tracker, observed, &AtomicBool::new(false), |tracked| {
         times.push((tracked.stage, before.elapsed()));

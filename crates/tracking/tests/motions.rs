@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use body::BodyModel;
 use model::{Camera, Silhouette};
-use moving::{cameras, distances, mixed, seen};
+use moving::{cameras, distances, mixed, pose, seen};
 use tracking::{
     Chunk, Error, Footage, ObservedFrame, Options, Stage, Tracker, follow, hold_unseen, merge, plan_chunks,
     track_chunk,
@@ -19,7 +19,7 @@ static GO: AtomicBool = AtomicBool::new(false);
 
 /// Follows a registered scan, whose surface is not one of the model's, through a mixed motion, from a start that `shape_fit`
 /// finds. Limits: mean joint error, largest, metres; least intersection over union.
-fn follow(test: &str, subjects: &[usize], views: usize, noise: Option<u64>, limits: [f64; 3]) {
+fn judge(test: &str, subjects: &[usize], views: usize, noise: Option<u64>, limits: [f64; 3]) {
     let Some(bodies) = testdata::shared("data/bodies", test) else { return };
     let data = scans::Scans::read(&bodies);
     let model = BodyModel::shipped();
@@ -64,12 +64,12 @@ fn follow(test: &str, subjects: &[usize], views: usize, noise: Option<u64>, limi
 #[test]
 fn scanned_people_are_followed_through_squats_and_turns() {
     let test = "scanned_people_are_followed_through_squats_and_turns";
-    follow(test, &[17, 60], 8, None, [0.008, 0.12, 0.93]);
+    judge(test, &[17, 60], 8, None, [0.008, 0.12, 0.93]);
 }
 
 #[test]
 fn a_scanned_person_is_followed_in_four_noisy_views() {
-    follow("a_scanned_person_is_followed_in_four_noisy_views", &[33], 4, Some(3), [0.01, 0.05, 0.93]);
+    judge("a_scanned_person_is_followed_in_four_noisy_views", &[33], 4, Some(3), [0.01, 0.05, 0.93]);
 }
 
 #[test]
@@ -95,6 +95,37 @@ fn chunks_tracked_apart_are_one_motion() {
         let most = distances(&tracked.joints, truth).fold(0.0, f64::max);
         assert!(most < 0.05, "frame {}: {most} m", tracked.frame);
     }
+}
+
+#[test]
+fn a_person_who_turns_round_once_has_no_jump_in_any_number() {
+    let model = BodyModel::shipped();
+    let cameras = cameras(4);
+    let frames = 25;
+    let heading = |frame: usize| 0.2 + std::f64::consts::TAU * frame as f64 / (frames - 1) as f64;
+    let motion: Vec<_> = (0..frames).map(|frame| pose(&model, heading(frame), [0, 1, 0, 0])).collect();
+    let frames: Vec<_> = motion.iter().map(|pose| seen(&model, &model.shape(&[]), pose, &cameras)).collect();
+    let plans = plan_chunks(frames.len(), 13, 3);
+    let chunks: Vec<Chunk> = plans
+        .iter()
+        .map(|plan| {
+            let views = frames[plan.first..plan.end].iter().map(|(views, _)| views);
+            // a key frame knows of no turns before it
+            let mut start = motion[plan.first].clone();
+            start[4] -= if plan.first == 0 { 0.0 } else { std::f64::consts::TAU };
+            let mut tracker = Tracker::new(&model, &[], &start, Options::default()).unwrap();
+            track_chunk(&mut tracker, plan.first, views, &GO, |_| ()).unwrap()
+        })
+        .collect();
+    let merged = merge(&model, &model.shape(&[]), &chunks).unwrap();
+    for tracked in [&chunks[0].frames, &merged.frames] {
+        for pair in tracked.windows(2) {
+            let moved = pair[1].pose.iter().zip(&pair[0].pose).map(|(a, b)| (a - b).abs());
+            assert!(moved.fold(0.0, f64::max) < 0.5, "frame {}: {:?}", pair[1].frame, pair[1].pose);
+        }
+    }
+    let turned = merged.frames[24].pose[4] - merged.frames[0].pose[4];
+    assert!((turned - std::f64::consts::TAU).abs() < 0.1, "{turned}");
 }
 
 #[test]
