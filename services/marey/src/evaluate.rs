@@ -4,6 +4,7 @@ pub(crate) mod motions;
 
 mod body_commands;
 mod capture;
+mod ik;
 mod multiview;
 mod overlay;
 mod recovery;
@@ -30,6 +31,8 @@ enum What {
     Feet(body_commands::Args),
     /// Compare what a run has made with the motion that really was
     Run(run_command::Args),
+    /// Find elbows and knees of moving limbs by inverse kinematics, with and without silhouettes, and compare
+    Ik(ik::Args),
     /// Find pose and shape of a known body in silhouettes, and compare
     Shape(Box<shape::Args>),
     /// Follow a known body through the frames of a capture, and compare
@@ -45,6 +48,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         What::Skeleton(args) => body_commands::skeletons(&args),
         What::Feet(args) => body_commands::feet(&args),
         What::Run(args) => run_command::run(&args),
+        What::Ik(args) => ik::run(&args),
         What::Shape(args) => shape::run(&args),
         What::Multiview(args) => multiview::run(&args),
         What::Recovery(args) => recovery::run(&args),
