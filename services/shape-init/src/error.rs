@@ -1,6 +1,6 @@
 //! What is wrong with a session's files or with a question.
 
-use camera_jobs::ModelError;
+use camera_jobs::{ModelError, ShapeError};
 use proto::ErrorCode;
 use queue::JobError;
 use service::FileError;
@@ -63,6 +63,18 @@ pub(crate) enum CallError {
 impl From<FileError> for CallError {
     fn from(error: FileError) -> Self {
         Self::Input(error.into())
+    }
+}
+
+impl From<ShapeError> for CallError {
+    fn from(error: ShapeError) -> Self {
+        match error {
+            ShapeError::Body(error) => Self::Input(error.into()),
+            ShapeError::Request(error) => Self::Request(error),
+            error => {
+                Self::Input(FileError::unexpected("body", error.to_string(), "a body of the model").into())
+            }
+        }
     }
 }
 

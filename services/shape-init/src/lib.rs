@@ -26,7 +26,6 @@ mod payload;
 mod plan_job;
 mod results;
 mod rpc;
-mod sampling;
 mod scratch;
 mod segment;
 mod shape_report;

@@ -2,17 +2,12 @@
 
 use std::sync::Arc;
 
-use camera_jobs::views;
+use camera_jobs::{Described, views};
 use proto::v1::{self, MeshFormat, shape_init_server::ShapeInit};
 use service::{FileError, compute::Slots};
 use tonic::{Request, Response, Status};
 
-use crate::{
-    InputError, Shared,
-    error::CallError,
-    hull::hull,
-    sampling::{out_of_range, sample},
-};
+use crate::{InputError, Shared, error::CallError, hull::hull};
 
 /// Largest request, bytes: silhouettes as PNG take some kilobytes each, photographs of masks a megabyte.
 pub(crate) const MAX_REQUEST_BYTES: usize = 32 << 20;
@@ -34,7 +29,14 @@ impl Rpc {
         let (_, model) =
             self.shared.models.of_request(&request.body_model_id).await.map_err(CallError::from)?;
         let sampled = self.slots.run(move || {
-            let shape = sample(&model, &request)?;
+            let described = Described {
+                alpha: &request.alpha,
+                stature_m: request.stature_m,
+                mass_kg: request.mass_kg,
+                age_years: request.age_years,
+                sex: &request.sex,
+            };
+            let shape = described.shape(&model)?;
             let mesh = match request.format() {
                 MeshFormat::Glb => body_files::glb(&model, &shape, None).map_err(InputError::from)?,
                 MeshFormat::Ply => formats::ply::write(&shape.mesh(&model)),
@@ -114,4 +116,8 @@ impl ShapeInit for Rpc {
     ) -> Result<Response<v1::PreviewHullResponse>, Status> {
         Ok(Response::new(self.preview(request.into_inner()).await?))
     }
+}
+
+fn out_of_range(field: &'static str, found: &str, expected: &'static str) -> proto::Error {
+    proto::Error::OutOfRange { field, found: found.to_owned(), expected }
 }
