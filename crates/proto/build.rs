@@ -6,6 +6,7 @@ use std::{error::Error, path::PathBuf};
 const ROOT: &str = "../../proto";
 const FILES: [&str; 6] = [
     "marey/v1/geometry.proto",
+    "marey/v1/inverse_kinematics.proto",
     "marey/v1/live.proto",
     "marey/v1/motion_index.proto",
     "marey/v1/reconstruction.proto",

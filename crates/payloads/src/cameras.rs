@@ -4,7 +4,7 @@ use multi_view::Parameters;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use crate::{BodyModelFile, InputFile};
+use crate::{BodyModelFile, InputFile, InverseKinematics};
 
 /// Kind of the first job of a run on cameras: [`PlanMultiView`], taken by the shape-init service.
 pub const PLAN_MULTI_VIEW: &str = "plan-multi-view";
@@ -34,4 +34,7 @@ pub struct PlanMultiView {
     pub metres_per_unit: Option<f64>,
     /// All resolved.
     pub parameters: Parameters,
+    /// The silhouettes are for inverse kinematics: no body is looked for in them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inverse_kinematics: Option<InverseKinematics>,
 }

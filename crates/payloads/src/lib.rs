@@ -7,6 +7,7 @@ mod augment;
 mod body_model;
 mod cameras;
 mod database;
+mod inverse_kinematics;
 mod run_report;
 mod silhouettes;
 
@@ -17,6 +18,10 @@ pub use database::{
     MotionDatabaseFile, MotionDatabaseName, PLAN_MOTION_DATABASE, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm,
 };
 
+pub use inverse_kinematics::{
+    BodyDescription, CamerasPlanned, IkSolver, InverseKinematics, SOLVE_INVERSE_KINEMATICS,
+    SolveInverseKinematics, frame_rate,
+};
 pub use run_report::{Code, FileReport, MultiViewReport, SessionReport, TrackingParts};
 pub use silhouettes::{
     CameraReport, ClipPlace, Members, Source, SourceKind, clip_name, file_part, picture_name, report_name,

@@ -19,7 +19,8 @@ use crate::{
   marey run \"take 3\" --database walks --map LWRA=left_wrist --map RWRA=right_wrist
   marey run \"take 3\" --database walks --set chunk_frames=1200
   marey run \"take 4\" --watch                                  (a session with cameras)
-  marey run \"take 4\" --cameras cam01,cam02,cam03 --camera GX010042.MP4=cam01")]
+  marey run \"take 4\" --cameras cam01,cam02,cam03 --camera GX010042.MP4=cam01
+  marey run \"take 5\" --kind inverse-kinematics --stature 1.78 --sex male --watch")]
 pub struct Args {
     /// The session: its name or id
     session: String,
@@ -41,9 +42,11 @@ pub struct Args {
     /// Metres of one unit of the calibration, where the file doesn't say it
     #[arg(long, value_name = "METRES", help_heading = "Cameras")]
     calibration_unit: Option<f64>,
-    /// sparse or multi-view, where a session has control points and cameras
-    #[arg(long, value_parser = ["sparse", "multi-view"])]
+    /// sparse, multi-view or inverse-kinematics; to be said where a session has control points and cameras
+    #[arg(long, value_parser = ["sparse", "multi-view", "inverse-kinematics"])]
     kind: Option<String>,
+    #[command(flatten)]
+    inverse_kinematics: InverseKinematicsArgs,
     /// Control points to use, separated by commas [default: all in the file]
     #[arg(long, value_delimiter = ',')]
     points: Vec<String>,
@@ -80,6 +83,52 @@ pub struct Args {
     server: ServerArgs,
 }
 
+/// Options that make a run one by inverse kinematics.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Inverse kinematics")]
+struct InverseKinematicsArgs {
+    /// plain, priority, image-constrained, extended, image-first or reach-then-image-then-posture [default: image-constrained
+    /// with cameras, else priority]
+    #[arg(long)]
+    solver: Option<String>,
+    /// Most steps of one solve [default: 15]
+    #[arg(long)]
+    steps: Option<u32>,
+    /// Frames a second that are solved [default: the cameras', or those of the file of points]
+    #[arg(long, value_name = "HZ")]
+    frame_rate: Option<f64>,
+    /// The person's height, metres
+    #[arg(long, value_name = "METRES")]
+    stature: Option<f64>,
+    /// The person's mass, kilograms
+    #[arg(long, value_name = "KG")]
+    mass: Option<f64>,
+    /// The person's age, years
+    #[arg(long, value_name = "YEARS")]
+    age: Option<f64>,
+    /// female or male
+    #[arg(long, value_parser = ["female", "male"])]
+    sex: Option<String>,
+}
+
+impl InverseKinematicsArgs {
+    /// The object of the request; none if nothing of it was said.
+    fn request(&self) -> Option<Value> {
+        let given = [
+            ("solver", self.solver.as_ref().map(|name| json!(name))),
+            ("steps", self.steps.map(Value::from)),
+            ("frame_rate", self.frame_rate.map(Value::from)),
+            ("stature_m", self.stature.map(Value::from)),
+            ("mass_kg", self.mass.map(Value::from)),
+            ("age_years", self.age.map(Value::from)),
+            ("sex", self.sex.as_ref().map(|sex| json!(sex))),
+        ];
+        let object: Map<String, Value> =
+            given.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect();
+        (!object.is_empty()).then_some(Value::Object(object))
+    }
+}
+
 /// Runs `marey run`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
@@ -110,6 +159,7 @@ fn request(args: &Args) -> anyhow::Result<Value> {
     let named = [
         ("motion_database", args.database.as_ref().map(|name| json!(name))),
         ("kind", args.kind.as_ref().map(|kind| json!(kind))),
+        ("inverse_kinematics", args.inverse_kinematics.request()),
         ("body_model", args.body_model.as_ref().map(|name| json!(name))),
         ("cameras", (!args.cameras.is_empty()).then(|| json!(args.cameras))),
         (

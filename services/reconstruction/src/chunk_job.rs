@@ -1,10 +1,6 @@
 //! The job that reconstructs one chunk.
 
-use crate::{
-    RECONSTRUCT_CHUNK, Shared,
-    error::InputError,
-    payload::{JobReport, ReconstructChunk},
-};
+use crate::{RECONSTRUCT_CHUNK, Shared, error::InputError, payload::ReconstructChunk};
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use sparse::Session;
@@ -32,7 +28,8 @@ impl Handler for ChunkHandler {
 
     async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
         let started = Instant::now();
-        let Shared { store, priors, memory, worker_name, .. } = &*self.shared;
+        let Shared { resources, priors, .. } = &*self.shared;
+        let store = &resources.store;
         objects::clean_up_earlier_attempts(store, &job).await;
         let payload: ReconstructChunk = job.payload()?;
         let session = objects::Input {
@@ -40,7 +37,7 @@ impl Handler for ChunkHandler {
             store_key: &payload.session.store_key,
             blake3: &payload.session.blake3,
         };
-        let session = objects::read(store, session, memory.max_object_bytes).await?;
+        let session = objects::read(store, session, resources.memory.max_object_bytes).await?;
         let prior = priors.get(&payload.motion_database, payload.parameters.window).await?;
         let (frames, of) = (payload.end.saturating_sub(payload.start), job.clone());
         let reconstruction = compute::run(move || -> Result<_, InputError> {
@@ -59,8 +56,7 @@ impl Handler for ChunkHandler {
         })
         .await?;
         job.check()?;
-        let seconds = started.elapsed().as_secs_f64();
-        let report = JobReport { worker: worker_name.clone(), attempt: job.attempt(), seconds, frames };
+        let report = resources.job_report(&job, started, frames);
         let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
         Ok(Outcome::default()
             .artefact(

@@ -83,6 +83,44 @@ pub enum InputError {
     /// A name stands for no point of the skeleton.
     #[error(transparent)]
     Points(#[from] kinematics::Error),
+    /// More points than a figure may have.
+    #[error("found {found} measured points, expected at most {limit}: choose some by name with points")]
+    TooManyPoints {
+        /// How many there are.
+        found: usize,
+        /// Most points.
+        limit: usize,
+    },
+    /// Something of a request is out of range.
+    #[error("{field} is {found}, expected {expected}")]
+    OutOfRange {
+        /// Name of the field.
+        field: &'static str,
+        /// What it is.
+        found: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// What cameras saw in a frame of a request can't be read.
+    #[error("frame {frame}: {source}")]
+    Frame {
+        /// Index of the frame.
+        frame: usize,
+        /// What is wrong.
+        source: service::FileError,
+    },
+    /// Nobody's body is described.
+    #[error(transparent)]
+    Shape(#[from] camera_jobs::ShapeError),
+    /// The body model does not go with inverse kinematics.
+    #[error(transparent)]
+    Body(#[from] body::Error),
+    /// A figure can't be solved.
+    #[error(transparent)]
+    InverseKinematics(#[from] inverse_kinematics::Error),
+    /// Silhouettes are damaged or missing.
+    #[error(transparent)]
+    Silhouettes(#[from] multi_view::Error),
 }
 
 impl From<InputError> for JobError {
@@ -108,6 +146,10 @@ pub(crate) enum CallError {
     Prior(#[source] JobError),
     #[error("database: {0}")]
     Catalogue(#[from] sqlx::Error),
+    #[error(transparent)]
+    Model(#[from] camera_jobs::ModelError),
+    #[error("the caller has gone")]
+    Gone,
     #[error("too many live streams: this service follows {limit} at once")]
     TooManyStreams { limit: usize },
     #[error("this service is shutting down")]
@@ -125,12 +167,20 @@ impl CallError {
             Self::Input(InputError::TooLong { .. }) | Self::TooManyStreams { .. } | Self::NoThread(_) => {
                 ErrorCode::TooLarge
             }
+            Self::Gone => ErrorCode::Cancelled,
+            Self::Model(error) => error.code(),
             Self::Panicked => ErrorCode::Internal,
             Self::Request(_) | Self::Input(_) => ErrorCode::InvalidInput,
             Self::NoSuchDatabase(_) => ErrorCode::NotFound,
             Self::Prior(JobError::GiveUp { .. }) => ErrorCode::NotReady,
             Self::Prior(_) | Self::Catalogue(_) | Self::ShuttingDown => ErrorCode::Unavailable,
         }
+    }
+}
+
+impl From<camera_jobs::ShapeError> for CallError {
+    fn from(error: camera_jobs::ShapeError) -> Self {
+        Self::Input(error.into())
     }
 }
 

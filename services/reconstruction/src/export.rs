@@ -34,7 +34,7 @@ pub(crate) const EXPORTS: [Export; 7] = [
 ];
 
 /// Positions of all joints: `frame,time,root_x,root_y,root_z,…`; seconds and metres, y up.
-fn positions(motion: &Motion) -> String {
+pub(crate) fn positions(motion: &Motion) -> String {
     let skeleton = motion.skeleton();
     let mut out = String::from("frame,time");
     for joint in skeleton.joints() {

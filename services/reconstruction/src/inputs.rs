@@ -80,15 +80,9 @@ pub(crate) fn read(
         Some(file) => read_skeleton(file, selection.reading, &mut warnings)?.skeleton,
         None => fallback.clone(),
     };
-    let file = at_most_one(files, "control-points")?.ok_or_else(|| InputError::Count {
-        role: "control-points",
-        found: 0,
-        names: String::new(),
-        expected: "one (CSV, TRC or C3D)",
-    })?;
-    let trajectories = read_points(file, selection.reading, &mut warnings)?;
+    let (file, trajectories) = measured_points(files, selection.reading, &mut warnings)?;
     let Selection { points, markers, .. } = *selection;
-    let chosen = control::choose(&file.name, trajectories, markers, points, &skeleton, &mut warnings)?;
+    let chosen = control::choose(&file, trajectories, markers, points, &skeleton, &mut warnings)?;
     let session = Session::new(skeleton, chosen.points, &chosen.trajectories)?;
     if let Some(truth) = ground_truth(files, fallback, selection.reading, session.num_frames() as f64 / 60.0)?
     {
@@ -156,6 +150,24 @@ fn read_skeleton(
         }
         _ => Err(kind_error(file, "skeleton", "an ASF or BVH file")),
     }
+}
+
+/// The name of the file of measured points, and what is in it.
+///
+/// # Errors
+/// If there is none, or it can't be read.
+pub(crate) fn measured_points(
+    files: &[NamedBytes],
+    reading: Reading,
+    warnings: &mut Vec<String>,
+) -> Result<(String, PointTrajectories), InputError> {
+    let file = at_most_one(files, "control-points")?.ok_or_else(|| InputError::Count {
+        role: "control-points",
+        found: 0,
+        names: String::new(),
+        expected: "one (CSV, TRC or C3D)",
+    })?;
+    Ok((file.name.clone(), read_points(file, reading, warnings)?))
 }
 
 fn read_points(

@@ -1,9 +1,11 @@
 //! The reconstruction service: full-body motion from control points.
 //!
-//! [`start`] runs the gRPC server (`marey.v1.Reconstruction`, `marey.v1.Live`, health, reflection) and claims three kinds of job:
+//! [`start`] runs the gRPC server (`marey.v1.Reconstruction`, `marey.v1.Live`, health, reflection) and claims four kinds of job:
 //!
 //! ```text
 //! plan-sparse ──► reconstruct-chunk × n ──► merge-chunks
+//!
+//! (make-silhouettes × cameras ──►) solve-inverse-kinematics
 //! ```
 //!
 //! [`PLAN_SPARSE`] reads what people uploaded and writes one canonical session; nothing after it reads an upload
@@ -16,6 +18,7 @@ mod error;
 mod evaluate;
 mod export;
 mod feet;
+mod ik;
 mod inputs;
 mod live;
 mod merge_job;
@@ -34,12 +37,12 @@ pub use payload::{
 };
 pub use performer::FittedReport;
 
+use camera_jobs::Models;
 use priors::Priors;
 use proto::v1::{live_server::LiveServer, reconstruction_server::ReconstructionServer};
-use service::{Config, Parts, Running};
+use service::{Config, Parts, Resources, Running};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use store::Store;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
 
@@ -58,12 +61,9 @@ pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCA
 
 /// What all handlers of one process share.
 struct Shared {
-    store: Store,
-    pool: sqlx::PgPool,
+    resources: Resources,
     priors: Priors,
-    memory: service::config::MemoryConfig,
-    /// How this process shows in `run.json`.
-    worker_name: String,
+    models: Models,
 }
 
 /// Starts the service; it runs until `shutdown`. [`Running::address`] says where it listens.
@@ -72,23 +72,24 @@ struct Shared {
 /// If the address, the store or the database's URL can't be used. A database that does not answer yet is
 /// waited for.
 pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Running, service::Error> {
-    let pool = service::database::pool(&config.database)?;
-    let store = Store::open(&config.store)?;
+    let resources = Resources::open(&config, NAME)?;
+    let pool = resources.pool.clone();
     let shared = Arc::new(Shared {
-        priors: Priors::new(store.clone(), &config.memory),
-        pool: pool.clone(),
-        store,
-        memory: config.memory.clone(),
-        worker_name: config.worker.name(NAME),
+        priors: Priors::new(resources.store.clone(), &config.memory),
+        models: Models::new(resources.clone()),
+        resources,
     });
     let live = live::LiveRpc::new(shared.clone(), config.live.clone(), shutdown.clone());
     let live = LiveServer::new(live).max_decoding_message_size(live::MAX_REQUEST_BYTES);
-    let routes = Routes::new(ReconstructionServer::new(rpc::Rpc::new(shared.clone()))).add_service(live);
+    let rpc = ReconstructionServer::new(rpc::Rpc::new(shared.clone()))
+        .max_decoding_message_size(ik::call::MAX_REQUEST_BYTES);
+    let routes = Routes::new(rpc).add_service(live);
     let builder = config.worker.builder(NAME, &pool).map(|builder| {
         builder
             .handler(plan_job::PlanHandler::new(shared.clone()))
             .handler(chunk_job::ChunkHandler::new(shared.clone()))
-            .handler(merge_job::MergeHandler::new(shared))
+            .handler(merge_job::MergeHandler::new(shared.clone()))
+            .handler(ik::job::IkHandler::new(shared))
     });
     let parts = Parts {
         name: NAME,

@@ -10,12 +10,10 @@ use crate::{
     plan_job,
     run_report::{RUN, RunReport},
 };
-use bytes::Bytes;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use sparse::{Reconstruction, Session};
 use std::{sync::Arc, time::Instant};
-use store::Store;
 
 pub(crate) struct MergeHandler {
     shared: Arc<Shared>,
@@ -34,7 +32,8 @@ impl Handler for MergeHandler {
 
     async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
         let started = Instant::now();
-        let Shared { store, worker_name, .. } = &*self.shared;
+        let resources = &self.shared.resources;
+        let store = &resources.store;
         objects::clean_up_earlier_attempts(store, &job).await;
         let payload: MergeChunks = job.payload()?;
         job.progress(0.0, "putting the parts together");
@@ -42,12 +41,7 @@ impl Handler for MergeHandler {
         let mut results = self.export(&job, &finished).await?;
         job.progress(0.9, "comparing with the ground truth");
         results.extend(self.evaluate(&job, &payload, &finished).await?);
-        let merge = JobReport {
-            worker: worker_name.clone(),
-            attempt: job.attempt(),
-            seconds: started.elapsed().as_secs_f64(),
-            frames: finished.merged.quality.len(),
-        };
+        let merge = resources.job_report(&job, started, finished.merged.quality.len());
         let report = RunReport::new(job.run_id().0, &payload, &finished, &chunks, &merge);
         let report = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
         results.push(objects::write_result(store, &job, RUN, "application/json", report).await?);
@@ -62,14 +56,12 @@ impl MergeHandler {
         job: &JobContext,
         payload: &MergeChunks,
     ) -> Result<(Arc<Finished>, Vec<JobReport>), JobError> {
-        let Shared { store, pool, priors, memory, .. } = &*self.shared;
-        let limit = memory.max_object_bytes;
-        let mut connection = pool.acquire().await?;
-        let artefacts = queue::dependency_artefacts(&mut connection, job.id()).await?;
-        drop(connection);
+        let Shared { resources, priors, .. } = &*self.shared;
+        let (store, limit) = (&resources.store, resources.memory.max_object_bytes);
+        let artefacts = resources.artefacts_before(job).await?;
         let (mut parts, mut reports) = (Vec::new(), Vec::new());
-        for artefact in artefacts.iter().map(|a| &a.artefact) {
-            let read = read_artefact(store, artefact, limit);
+        for artefact in &artefacts {
+            let read = resources.read_artefact(artefact, limit);
             match artefact.name.as_str() {
                 chunk_job::CHUNK => parts.push(read.await?),
                 chunk_job::REPORT => {
@@ -110,8 +102,14 @@ impl MergeHandler {
             let finished = finished.clone();
             let content = compute::run(move || (export.write)(&finished)).await;
             results.push(
-                objects::write_result(&self.shared.store, job, export.name, export.media_type, content)
-                    .await?,
+                objects::write_result(
+                    &self.shared.resources.store,
+                    job,
+                    export.name,
+                    export.media_type,
+                    content,
+                )
+                .await?,
             );
         }
         Ok(results)
@@ -124,13 +122,14 @@ impl MergeHandler {
         payload: &MergeChunks,
         finished: &Arc<Finished>,
     ) -> Result<Option<Artefact>, JobError> {
-        let Shared { store, priors, memory, .. } = &*self.shared;
+        let Shared { resources, priors, .. } = &*self.shared;
+        let store = &resources.store;
         let files = &payload.request.files;
         if !files.iter().any(|f| f.role == "ground-truth") {
             return Ok(None);
         }
         let wanted: Vec<_> = files.iter().filter(|f| f.role != "control-points").cloned().collect();
-        let fetched = plan_job::fetch(store, &wanted, memory.max_object_bytes).await?;
+        let fetched = plan_job::fetch(store, &wanted, resources.memory.max_object_bytes).await?;
         let database = priors.database(&payload.request.motion_database).await?;
         let finished = finished.clone();
         let reading = payload.request.reading();
@@ -141,10 +140,4 @@ impl MergeHandler {
         let json = serde_json::to_vec_pretty(&errors).map_err(JobError::retry)?;
         Ok(Some(objects::write_result(store, job, evaluate::EVALUATION, "application/json", json).await?))
     }
-}
-
-async fn read_artefact(store: &Store, artefact: &Artefact, limit: u64) -> Result<Bytes, JobError> {
-    let input =
-        objects::Input { name: &artefact.name, store_key: &artefact.store_key, blake3: &artefact.blake3 };
-    objects::read(store, input, limit).await
 }

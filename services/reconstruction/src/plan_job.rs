@@ -39,7 +39,8 @@ impl Handler for PlanHandler {
 
     async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
         let started = Instant::now();
-        let Shared { store, priors, memory, worker_name, .. } = &*self.shared;
+        let Shared { resources, priors, .. } = &*self.shared;
+        let (store, memory) = (&resources.store, &resources.memory);
         objects::clean_up_earlier_attempts(store, &job).await;
         let request: PlanSparse = job.payload()?;
         request.parameters.check().map_err(InputError::from)?;
@@ -73,12 +74,7 @@ impl Handler for PlanHandler {
         job.progress(0.02, "planning");
         let artefact = objects::write(store, &job, "session.bin", "application/octet-stream", bytes).await?;
         let session = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
-        let report = JobReport {
-            worker: worker_name.clone(),
-            attempt: job.attempt(),
-            seconds: started.elapsed().as_secs_f64(),
-            frames: evidence.session.num_frames(),
-        };
+        let report = resources.job_report(&job, started, evidence.session.num_frames());
         Ok(Outcome::default()
             .artefact(artefact)
             .children(children(request, session, evidence, fitted, report)?))

@@ -1,13 +1,12 @@
 //! `marey.v1.Reconstruction`: poses at once.
 
-use crate::{Shared, error::CallError, payload::MotionDatabaseFile, priors::Prior};
+use crate::{Shared, error::CallError, ik, payload::MotionDatabaseFile, priors::Prior};
 use kinematics::{Kinematics, Parametrisation, control_points};
 use model::{PointTrajectories, Skeleton};
-use proto::v1::{self, reconstruction_server::Reconstruction};
-use service::compute;
+use proto::v1::{self, reconstruction_server::Reconstruction, solve_inverse_kinematics_request::Performer};
+use service::compute::Slots;
 use sparse::{Merged, Parameters, Session};
 use std::{ops::ControlFlow, sync::Arc};
-use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 use uuid::Uuid;
@@ -21,14 +20,12 @@ const FRAME_RATES: std::ops::RangeInclusive<f64> = 10.0..=10_000.0;
 
 pub(crate) struct Rpc {
     shared: Arc<Shared>,
-    /// Calls that compute at once: one a core, the rest wait.
-    slots: Semaphore,
+    slots: Slots,
 }
 
 impl Rpc {
     pub fn new(shared: Arc<Shared>) -> Self {
-        let slots = std::thread::available_parallelism().map_or(1, usize::from);
-        Self { shared, slots: Semaphore::new(slots) }
+        Self { shared, slots: Slots::default() }
     }
 
     async fn solve(&self, request: v1::SolvePoseRequest) -> Result<v1::SolvePoseResponse, CallError> {
@@ -49,15 +46,27 @@ impl Rpc {
         let file = self.shared.motion_database(id).await?;
         let parameters = Parameters::default();
         let prior = self.shared.priors.get(&file, parameters.window).await.map_err(CallError::Prior)?;
-        // A failure to get a slot would mean that the semaphore was closed, which nobody does.
-        let _slot = self.slots.acquire().await;
         let gone = CancellationToken::new();
         let _when_dropped = gone.clone().drop_guard();
-        compute::run(move || {
+        let answered = self.slots.run(move || {
             let merged = solve(&prior, &request.skeleton_asf, &trajectories, &parameters, &gone)?;
             Ok(answer(&merged))
-        })
-        .await
+        });
+        answered.await
+    }
+
+    async fn solve_ik(
+        &self,
+        request: v1::SolveInverseKinematicsRequest,
+    ) -> Result<v1::SolveInverseKinematicsResponse, CallError> {
+        ik::call::check(&request)?;
+        let model = match &request.performer {
+            Some(Performer::Body(body)) => Some(self.shared.models.of_request(&body.body_model_id).await?.1),
+            _ => None,
+        };
+        let gone = CancellationToken::new();
+        let _when_dropped = gone.clone().drop_guard();
+        self.slots.run(move || ik::call::solve(&request, model.as_deref(), &gone)).await
     }
 }
 
@@ -67,7 +76,7 @@ impl Shared {
         let sql = "SELECT id, name, version, store_key, blake3 FROM motion_databases
                    WHERE id = $1 AND store_key IS NOT NULL";
         let row: Option<(Uuid, String, i32, String, String)> =
-            sqlx::query_as(sql).bind(id).fetch_optional(&self.pool).await?;
+            sqlx::query_as(sql).bind(id).fetch_optional(&self.resources.pool).await?;
         let (id, name, version, store_key, blake3) = row.ok_or(CallError::NoSuchDatabase(id))?;
         Ok(MotionDatabaseFile { id, name, version, store_key, blake3, gplvm: None })
     }
@@ -80,6 +89,13 @@ impl Reconstruction for Rpc {
         request: Request<v1::SolvePoseRequest>,
     ) -> Result<Response<v1::SolvePoseResponse>, Status> {
         Ok(Response::new(self.solve(request.into_inner()).await?))
+    }
+
+    async fn solve_inverse_kinematics(
+        &self,
+        request: Request<v1::SolveInverseKinematicsRequest>,
+    ) -> Result<Response<v1::SolveInverseKinematicsResponse>, Status> {
+        Ok(Response::new(self.solve_ik(request.into_inner()).await?))
     }
 }
 

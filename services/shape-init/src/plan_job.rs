@@ -6,7 +6,10 @@ use bytes::Bytes;
 use formats::{calibration, image_files};
 use model::Camera;
 use multi_view::CameraRecord;
-use payloads::{InputFile, JobReport, PLAN_MULTI_VIEW, PlanMultiView, Source, SourceKind};
+use payloads::{
+    CamerasPlanned, InputFile, JobReport, PLAN_MULTI_VIEW, PlanMultiView, SOLVE_INVERSE_KINEMATICS,
+    SolveInverseKinematics, Source, SourceKind,
+};
 use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{FileError, compute};
 
@@ -21,7 +24,7 @@ const MAX_CALIBRATION_BYTES: u64 = 64 << 20;
 /// Attempts of a camera: more than usual, as one may be lost with each worker that is taken away.
 const CAMERA_ATTEMPTS: i32 = 5;
 /// Share of the last job in the run's progress; that of a camera is 1.
-const INITIALISE_WEIGHT: f64 = 2.0;
+const LAST_WEIGHT: f64 = 2.0;
 
 pub(crate) struct PlanHandler {
     shared: Arc<Shared>,
@@ -52,6 +55,8 @@ impl Handler for PlanHandler {
         let names: Vec<String> = cameras.iter().map(|camera| camera.name.clone()).collect();
         let matched =
             sources::match_cameras(sources, &names, &request.cameras, &request.camera_files, &mut warnings)?;
+        // measured points say where the person is; without them it takes two views
+        sources::check_count(&matched, if request.inverse_kinematics.is_some() { 1 } else { 2 })?;
         let plan = self.shared.resources.job_report(&job, started, 0);
         Ok(Outcome::default().children(children(request, &cameras, matched, warnings, plan)?))
     }
@@ -151,10 +156,22 @@ fn children(
         let payload = serde_json::to_value(payload).map_err(JobError::retry)?;
         jobs.push(ChildJob::new(MAKE_SILHOUETTES, payload).max_attempts(CAMERA_ATTEMPTS));
     }
-    let initialise =
-        serde_json::to_value(InitialiseBody { request, warnings, plan }).map_err(JobError::retry)?;
-    let last =
-        ChildJob::new(INITIALISE_BODY, initialise).weight(INITIALISE_WEIGHT).depends_on(0..num_cameras);
-    jobs.push(last);
+    let (kind, payload) = match request.inverse_kinematics.clone() {
+        Some(how) => {
+            let solve = SolveInverseKinematics {
+                session_id: request.session_id,
+                session_name: request.session_name,
+                body_model: request.body_model,
+                files: request.files,
+                up: request.up,
+                how,
+                cameras: Some(CamerasPlanned { first_frame: request.parameters.first_frame, warnings, plan }),
+            };
+            (SOLVE_INVERSE_KINEMATICS, serde_json::to_value(solve))
+        }
+        None => (INITIALISE_BODY, serde_json::to_value(InitialiseBody { request, warnings, plan })),
+    };
+    let payload = payload.map_err(JobError::retry)?;
+    jobs.push(ChildJob::new(kind, payload).weight(LAST_WEIGHT).depends_on(0..num_cameras));
     Ok(jobs)
 }

@@ -131,13 +131,17 @@ pub(crate) fn match_cameras(
             warnings.push(format!("camera {name} has no video, pictures or masks: it is not used"));
         }
     }
-    if found.len() < 2 {
-        return Err(FileError::unexpected(
-            "session",
-            format!("pictures of {} of the calibrated cameras", found.len()),
-            "at least 2",
-        )
-        .into());
-    }
     Ok(found)
+}
+
+/// Refuses sessions with fewer than `least` cameras.
+///
+/// # Errors
+/// If there are fewer.
+pub(crate) fn check_count(found: &[CameraSources], least: usize) -> Result<(), InputError> {
+    if found.len() >= least {
+        return Ok(());
+    }
+    let seen = format!("pictures of {} of the calibrated cameras", found.len());
+    Err(FileError::unexpected("session", seen, format!("at least {least}")).into())
 }

@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 
 use multi_view::Parameters;
-use payloads::{InputFile, PLAN_MULTI_VIEW, PlanMultiView, SHIPPED};
+use payloads::{
+    InputFile, InverseKinematics, PLAN_MULTI_VIEW, PlanMultiView, SHIPPED, SOLVE_INVERSE_KINEMATICS,
+    SolveInverseKinematics,
+};
 use queue::{NewRun, ProjectId};
 use serde_json::{Map, Value};
 use sqlx::PgConnection;
@@ -16,6 +19,8 @@ use super::{
 };
 use crate::error::{Error, Result};
 
+/// Kind of runs by inverse kinematics.
+pub(super) const INVERSE_KINEMATICS: &str = "inverse-kinematics";
 /// Most files that a request names the cameras of.
 const MAX_NAMES: usize = 256;
 /// Units of calibrations, metres.
@@ -61,6 +66,8 @@ pub(super) struct NewMultiView {
     pub request: CameraRequest,
     pub up: Option<model::Axis>,
     pub parameters: Map<String, Value>,
+    /// what the silhouettes are for, if it is that
+    pub inverse_kinematics: Option<InverseKinematics>,
 }
 
 impl NewMultiView {
@@ -74,7 +81,7 @@ impl NewMultiView {
     ) -> Result<Uuid> {
         let parameters = self.resolve()?;
         check_files(&files)?;
-        let Self { request, up, .. } = self;
+        let Self { request, up, inverse_kinematics, .. } = self;
         if request.camera_files.len() > MAX_NAMES || request.cameras.len() > MAX_NAMES {
             return Err(Error::Unprocessable(format!(
                 "cameras and camera_files have more than {MAX_NAMES} names, expected fewer"
@@ -98,16 +105,32 @@ impl NewMultiView {
             up: up.as_ref().and_then(Value::as_str).map(str::to_owned),
             metres_per_unit: request.metres_per_unit,
             parameters,
+            inverse_kinematics,
         };
+        let kind = if plan.inverse_kinematics.is_some() { INVERSE_KINEMATICS } else { "multi-view" };
         let new = NewRun {
             project_id: ProjectId(project_id),
-            kind: "multi-view",
+            kind,
             session_id: Some(session.id),
             parameters: serde_json::to_value(&plan)?,
         };
         let run_id = start(db, &new, PLAN_MULTI_VIEW).await?;
         body_models::uses(db, run_id, Some(model.id).filter(|id| !id.is_nil())).await?;
         Ok(run_id)
+    }
+
+    /// A run by inverse kinematics: on cameras where its solver looks at them.
+    pub async fn start_solving(
+        self,
+        db: &mut PgConnection,
+        project_id: Uuid,
+        session: &Session,
+        files: Vec<InputFile>,
+    ) -> Result<Uuid> {
+        match &self.inverse_kinematics {
+            Some(how) if how.solver.uses_images() => self.start(db, project_id, session, files).await,
+            _ => start_blind(db, project_id, session, files, self).await,
+        }
     }
 
     /// All parameters, those left out with their defaults.
@@ -126,6 +149,50 @@ impl NewMultiView {
         parameters.check().map_err(|error| refuse(&error))?;
         Ok(parameters)
     }
+}
+
+/// A run by inverse kinematics from measured points alone: the run and its only job.
+async fn start_blind(
+    db: &mut PgConnection,
+    project_id: Uuid,
+    session: &Session,
+    files: Vec<InputFile>,
+    asked: NewMultiView,
+) -> Result<Uuid> {
+    let request = &asked.request;
+    let stray = [
+        ("cameras", !request.cameras.is_empty()),
+        ("camera_files", !request.camera_files.is_empty()),
+        ("background", request.background.is_some()),
+        ("metres_per_unit", request.metres_per_unit.is_some()),
+        ("parameters", !asked.parameters.is_empty()),
+    ];
+    if let Some((name, _)) = stray.iter().find(|(_, is_given)| *is_given) {
+        return Err(Error::Unprocessable(format!(
+            "{name} is for cameras; this run looks at none: upload a calibration and what they saw, or leave it out"
+        )));
+    }
+    let which = request.body_model.as_deref().unwrap_or(SHIPPED);
+    let model = body_models::find(db, project_id, which, Latest::Ready, Lock::Share).await?;
+    let up = asked.up.map(serde_json::to_value).transpose()?;
+    let solve = SolveInverseKinematics {
+        session_id: session.id,
+        session_name: session.name.clone(),
+        body_model: model.ready()?,
+        files,
+        up: up.as_ref().and_then(Value::as_str).map(str::to_owned),
+        how: asked.inverse_kinematics.unwrap_or_default(),
+        cameras: None,
+    };
+    let new = NewRun {
+        project_id: ProjectId(project_id),
+        kind: INVERSE_KINEMATICS,
+        session_id: Some(session.id),
+        parameters: serde_json::to_value(&solve)?,
+    };
+    let run_id = start(db, &new, SOLVE_INVERSE_KINEMATICS).await?;
+    body_models::uses(db, run_id, Some(model.id).filter(|id| !id.is_nil())).await?;
+    Ok(run_id)
 }
 
 /// A calibration, and something that cameras saw.

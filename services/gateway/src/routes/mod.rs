@@ -10,6 +10,7 @@ mod databases;
 mod download;
 mod events;
 mod files;
+mod inverse_kinematics;
 pub(crate) mod live;
 mod lookup;
 mod me;

@@ -21,7 +21,8 @@ use crate::{
 pub(crate) struct Run {
     /// id
     pub id: Uuid,
-    /// `reconstruction`, `multi-view` (of a session with cameras), `motion-database` or `body-model` (a build), or `training`
+    /// `reconstruction`, `multi-view` (of a session with cameras), `inverse-kinematics`, `motion-database` or `body-model` (a
+    /// build), or `training`
     #[schema(example = "reconstruction")]
     pub kind: String,
     /// `queued`, `running`, `succeeded`, `failed` or `cancelled`

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use axum::extract::State;
-use payloads::InputFile;
+use payloads::{InputFile, InverseKinematics};
 use queue::{NewJob, NewRun, ProjectId};
 use serde::Deserialize;
 use serde_json::{Map, Value};
@@ -15,6 +15,7 @@ use super::{
     builds,
     cameras::{self, CameraRequest},
     contents, files,
+    inverse_kinematics::InverseKinematicsRequest,
     lookup::{self, Latest, Lock},
     runs::{self, Run},
 };
@@ -36,8 +37,9 @@ const POINTS: std::ops::RangeInclusive<usize> = 2..=16;
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NewReconstruction {
-    /// `sparse` (from control points) or `multi-view` (from calibrated cameras); what the session's files are for when left
-    /// out, and to be said if they are for both
+    /// `sparse` (from control points and a motion database), `multi-view` (from calibrated cameras) or `inverse-kinematics` (a
+    /// body whose measured points are reached, and whose limbs lie in the silhouettes of any number of cameras, if there are
+    /// any); what the session's files are for when left out, and to be said if they are for both
     #[schema(example = "sparse")]
     kind: Option<String>,
     /// for control points, and needed there: the motion database to learn from: id, `name` (its latest version that is
@@ -62,6 +64,8 @@ pub(crate) struct NewReconstruction {
     /// for cameras: metres of one unit of the calibration, where the file doesn't say it
     #[schema(example = 0.001)]
     metres_per_unit: Option<f64>,
+    /// for inverse kinematics: the solver and the body; makes the kind that
+    inverse_kinematics: Option<InverseKinematicsRequest>,
     /// control points to use, by name; all that the files have when left out
     #[serde(default)]
     #[schema(example = json!(["left_wrist", "right_wrist", "left_ankle", "right_ankle"]))]
@@ -108,13 +112,15 @@ impl NewReconstruction {
             Some("sparse") => return Ok(false),
             Some("multi-view") => return Ok(true),
             Some(kind) => {
-                return Err(Error::Unprocessable(format!("kind is {kind:?}, expected sparse or multi-view")));
+                return Err(Error::Unprocessable(format!(
+                    "kind is {kind:?}, expected sparse, multi-view or inverse-kinematics"
+                )));
             }
             None => {}
         }
         match (has("control-points"), has("calibration")) {
             (true, true) => Err(Error::Unprocessable(
-                "the session has control points and cameras; say kind: sparse or multi-view".into(),
+                "the session has control points and cameras; say kind: sparse, multi-view or inverse-kinematics".into(),
             )),
             (false, true) => Ok(true),
             (false, false) if self.motion_database.is_none() => Err(Error::Unprocessable(
@@ -156,7 +162,50 @@ impl NewReconstruction {
             )));
         }
         let (up, parameters) = (self.up, self.parameters.clone());
-        Ok(cameras::NewMultiView { request: self.for_cameras(), up, parameters })
+        Ok(cameras::NewMultiView { request: self.for_cameras(), up, parameters, inverse_kinematics: None })
+    }
+
+    fn is_inverse_kinematics(&self) -> Result<bool> {
+        match self.kind.as_deref() {
+            Some(cameras::INVERSE_KINEMATICS) => Ok(true),
+            Some(kind) if self.inverse_kinematics.is_some() => Err(Error::Unprocessable(format!(
+                "inverse_kinematics is given with kind {kind:?}, expected kind inverse-kinematics"
+            ))),
+            _ => Ok(self.inverse_kinematics.is_some()),
+        }
+    }
+
+    /// A run by inverse kinematics: what is for motion databases must not be given.
+    fn inverse_kinematics(&self, files: &[InputFile]) -> Result<cameras::NewMultiView> {
+        let stray = [
+            ("motion_database", self.motion_database.is_some()),
+            ("bvh_metres_per_unit", self.bvh_metres_per_unit.is_some()),
+            ("method", self.method.is_some()),
+            ("window", self.window.is_some()),
+            ("neighbours", self.neighbours.is_some()),
+        ];
+        if let Some((name, _)) = stray.iter().find(|(_, is_given)| *is_given) {
+            return Err(Error::Unprocessable(format!(
+                "{name} is for runs with a motion database, this one is by inverse kinematics"
+            )));
+        }
+        self.check_points()?;
+        let asked = self.inverse_kinematics.clone().unwrap_or_default();
+        let how = InverseKinematics {
+            points: self.points.clone(),
+            mapping: self.mapping.clone(),
+            marker_set: self.marker_set.clone(),
+            marker_map: self.marker_map.clone(),
+            marker_prefix: self.marker_prefix.clone(),
+            ..asked.resolve(files)?
+        };
+        let (up, parameters) = (self.up, self.parameters.clone());
+        Ok(cameras::NewMultiView {
+            request: self.for_cameras(),
+            up,
+            parameters,
+            inverse_kinematics: Some(how),
+        })
     }
 
     fn check_points(&self) -> Result<()> {
@@ -236,7 +285,8 @@ pub(super) fn resolve_parameters(mut given: Map<String, Value>, has_own_skeleton
 
 /// Reconstruct a session
 ///
-/// Full-body motion from the session's control points, or the body of a person from what its cameras saw. Answers at once (202) with the run; watch it at
+/// Full-body motion from the session's control points, the body of a person from what its cameras saw, or poses of a body
+/// by inverse kinematics, from measured points and silhouettes. Answers at once (202) with the run; watch it at
 /// `/v1/runs/{run_id}/events`.
 #[utoipa::path(
     post, path = "/v1/sessions/{session_id}/runs", tag = "runs", request_body = NewReconstruction,
@@ -271,8 +321,14 @@ pub(super) async fn reconstruction(
     }
     let session = lookup::session(&mut tx, project_id, session_id, Lock::Share).await?;
     let files = inputs(&mut tx, session_id).await?;
-    if body.is_for_cameras(&files)? {
-        let run_id = body.multi_view()?.start(&mut tx, project_id, &session, files).await?;
+    let is_inverse_kinematics = body.is_inverse_kinematics()?;
+    if is_inverse_kinematics || body.is_for_cameras(&files)? {
+        let run_id = if is_inverse_kinematics {
+            let asked = body.inverse_kinematics(&files)?;
+            asked.start_solving(&mut tx, project_id, &session, files).await?
+        } else {
+            body.multi_view()?.start(&mut tx, project_id, &session, files).await?
+        };
         let run = runs::find(&mut tx, project_id, run_id).await?;
         let answer = Answer::accepted(format!("/v1/runs/{run_id}"), &run)?;
         return request.commit(tx, project_id, answer).await;

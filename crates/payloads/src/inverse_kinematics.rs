@@ -1,0 +1,125 @@
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use uuid::Uuid;
+
+use crate::{BodyModelFile, CameraReport, InputFile, JobReport};
+
+/// Kind of the job [`SolveInverseKinematics`], taken by the reconstruction service.
+pub const SOLVE_INVERSE_KINEMATICS: &str = "solve-inverse-kinematics";
+
+/// What is wanted of a pose, the most important first.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum IkSolver {
+    /// measured points alone
+    Plain,
+    /// measured points, then a neutral posture
+    Priority,
+    /// measured points; silhouettes in their null space
+    #[default]
+    ImageConstrained,
+    /// silhouettes and measured points in one Jacobian
+    Extended,
+    /// silhouettes before measured points
+    ImageFirst,
+    /// measured points, silhouettes, neutral posture
+    ReachThenImageThenPosture,
+}
+
+impl IkSolver {
+    /// Whether silhouettes are looked at.
+    pub fn uses_images(self) -> bool {
+        !matches!(self, Self::Plain | Self::Priority)
+    }
+}
+
+/// Whose body it is: coefficients of the body model, or simple measurements.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BodyDescription {
+    /// coefficients, standard deviations; with any, nothing else may be given
+    pub alpha: Vec<f64>,
+    /// metres
+    pub stature_m: Option<f64>,
+    /// kilograms
+    pub mass_kg: Option<f64>,
+    /// years
+    pub age_years: Option<f64>,
+    /// `female` or `male`
+    pub sex: Option<String>,
+}
+
+/// How a session is solved by inverse kinematics.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct InverseKinematics {
+    /// what is wanted
+    pub solver: IkSolver,
+    /// most steps of one solve
+    pub steps: usize,
+    /// frames a second that are solved; `None`: the cameras', or else those of the points' file
+    #[serde(default)]
+    pub frame_rate: Option<f64>,
+    /// whose body
+    #[serde(default)]
+    pub body: BodyDescription,
+    /// points to use, by name; empty: all of the file that the body has
+    #[serde(default)]
+    pub points: Vec<String>,
+    /// name in the file → name of a control point or joint
+    #[serde(default)]
+    pub mapping: BTreeMap<String, String>,
+    /// the marker set whose names the file has, as in other runs
+    #[serde(default)]
+    pub marker_set: Option<String>,
+    /// text of a marker map, TOML
+    #[serde(default)]
+    pub marker_map: Option<String>,
+    /// what the names of the performer's markers begin with
+    #[serde(default)]
+    pub marker_prefix: Option<String>,
+}
+
+/// Solves a session's measured points, and silhouettes that jobs before it have made, for the poses of a body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SolveInverseKinematics {
+    /// The session.
+    pub session_id: Uuid,
+    /// Its name.
+    pub session_name: String,
+    /// The bodies that people may have.
+    pub body_model: BodyModelFile,
+    /// The session's files, in order of name.
+    pub files: Vec<InputFile>,
+    /// Axis of the files of points that points up, `x`, `y`, `z`, where they don't say it or say it wrong.
+    #[serde(default)]
+    pub up: Option<String>,
+    /// All resolved.
+    pub how: InverseKinematics,
+    /// With cameras, their plan.
+    #[serde(default)]
+    pub cameras: Option<CamerasPlanned>,
+}
+
+/// What the plan of the cameras hands on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CamerasPlanned {
+    /// First frame that there are silhouettes of.
+    pub first_frame: usize,
+    /// What was sloppy about the files.
+    pub warnings: Vec<String>,
+    /// What the plan itself took.
+    pub plan: JobReport,
+}
+
+/// Frames a second at which all cameras recorded, if a file tells; with a warning where they differ.
+pub fn frame_rate(cameras: &[CameraReport], warnings: &mut Vec<String>) -> Option<f64> {
+    let mut known = cameras.iter().filter_map(|camera| Some((&camera.camera.name, camera.frame_rate?)));
+    let (first, rate) = known.next()?;
+    if let Some((other, found)) = known.find(|(_, found)| (found - rate).abs() > 0.01 * rate) {
+        warnings.push(format!(
+            "camera {other} has {found} frames a second, camera {first} {rate}: all are taken to have {rate}"
+        ));
+    }
+    Some(rate)
+}
