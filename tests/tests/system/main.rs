@@ -8,6 +8,7 @@ mod databases;
 mod downloads;
 mod faults;
 mod interface;
+mod inverse_kinematics;
 mod live;
 mod markers;
 mod runs;
