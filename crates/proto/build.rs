@@ -4,7 +4,7 @@ use prost::Message;
 use std::{error::Error, path::PathBuf};
 
 const ROOT: &str = "../../proto";
-const FILES: [&str; 6] = [
+const FILES: [&str; 7] = [
     "marey/v1/geometry.proto",
     "marey/v1/inverse_kinematics.proto",
     "marey/v1/live.proto",
