@@ -1,7 +1,7 @@
 use std::ops::Range;
 
-use model::{Camera, Silhouette};
-use multi_view::{CameraRecord, SilhouetteClip};
+use model::{Camera, PointMatch, Silhouette};
+use multi_view::{CameraRecord, MatchClip, SilhouetteClip};
 use payloads::{CameraReport, Object, report_name};
 use queue::{Artefact, JobError};
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ const MAX_BYTES: u64 = 256 << 20;
 /// What one camera saw of the person.
 pub type View = (Camera, Silhouette);
 
-/// A clip of silhouettes in the store.
+/// A clip of silhouettes, or of points that were found again, in the store.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredClip {
     /// first frame in it
@@ -34,6 +34,9 @@ pub struct CameraClips {
     pub camera: CameraRecord,
     /// without gaps
     pub clips: Vec<StoredClip>,
+    /// points that were found again, of the same frames; none where there are no pictures
+    #[serde(default)]
+    pub matches: Vec<StoredClip>,
 }
 
 impl CameraClips {
@@ -48,8 +51,9 @@ impl CameraClips {
             let object = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
             Ok(StoredClip { first_frame: place.first_frame, num_frames: place.num_frames, object })
         };
-        let clips: Result<_, JobError> = report.clips.iter().map(stored).collect();
-        Ok(Self { camera: report.camera.clone(), clips: clips? })
+        let all = |places: &[payloads::ClipPlace]| places.iter().map(stored).collect::<Result<Vec<StoredClip>, JobError>>();
+        let (clips, matches) = (all(&report.clips)?, all(&report.matches)?);
+        Ok(Self { camera: report.camera.clone(), clips, matches })
     }
 }
 
@@ -72,10 +76,18 @@ pub async fn reports(resources: &Resources, artefacts: &[Artefact]) -> Result<Ve
     Ok(reports)
 }
 
-/// The silhouettes of all cameras in a run of frames: in memory as they are packed, about a kilobyte each.
+/// The silhouettes of all cameras in a run of frames, and the points that were found again: in memory as they are packed, a few
+/// kilobytes each.
 #[derive(Debug, Clone)]
 pub struct Silhouettes {
-    cameras: Vec<(Camera, Vec<SilhouetteClip>)>,
+    cameras: Vec<OfCamera>,
+}
+
+#[derive(Debug, Clone)]
+struct OfCamera {
+    camera: Camera,
+    clips: Vec<SilhouetteClip>,
+    matches: Vec<MatchClip>,
 }
 
 impl Silhouettes {
@@ -91,18 +103,9 @@ impl Silhouettes {
         let mut read = Vec::with_capacity(cameras.len());
         for of in cameras {
             let camera = of.camera.camera().map_err(JobError::retry)?;
-            let mut clips = Vec::new();
-            let is_wanted = |clip: &&StoredClip| {
-                clip.first_frame < frames.end && clip.first_frame + clip.num_frames > frames.start
-            };
-            for clip in of.clips.iter().filter(is_wanted) {
-                let Object { store_key, blake3 } = &clip.object;
-                let input = Input { name: "a clip of silhouettes", store_key, blake3 };
-                let bytes = objects::read(&resources.store, input, MAX_BYTES).await?;
-                let clip = compute::run(move || SilhouetteClip::from_bytes(&bytes)).await;
-                clips.push(clip.map_err(JobError::retry)?);
-            }
-            read.push((camera, clips));
+            let clips = clips(resources, &of.clips, &frames, SilhouetteClip::from_bytes).await?;
+            let matches = self::clips(resources, &of.matches, &frames, MatchClip::from_bytes).await?;
+            read.push(OfCamera { camera, clips, matches });
         }
         Ok(Self { cameras: read })
     }
@@ -112,7 +115,7 @@ impl Silhouettes {
     /// # Errors
     /// If a camera has no silhouette of it, or a damaged one.
     pub fn views(&self, frame: usize) -> multi_view::Result<Vec<View>> {
-        let of_camera = |(camera, clips): &(Camera, Vec<SilhouetteClip>)| {
+        let of_camera = |OfCamera { camera, clips, .. }: &OfCamera| {
             let clip = clips.iter().find(|clip| clip.frames().contains(&frame));
             let missing = || {
                 let start = clips.first().map_or(0, |clip| clip.frames().start);
@@ -123,4 +126,37 @@ impl Silhouettes {
         };
         self.cameras.iter().map(of_camera).collect()
     }
+
+    /// The points of every camera that were found again in a frame; none where they were not looked for.
+    ///
+    /// # Errors
+    /// If they are damaged.
+    pub fn matches(&self, frame: usize) -> multi_view::Result<Vec<Vec<PointMatch>>> {
+        let of_camera = |of: &OfCamera| {
+            let clip = of.matches.iter().find(|clip| clip.frames().contains(&frame));
+            clip.map_or(Ok(Vec::new()), |clip| clip.get(frame))
+        };
+        self.cameras.iter().map(of_camera).collect()
+    }
+}
+
+/// Reads the clips that have some of the frames.
+async fn clips<T: Send + 'static>(
+    resources: &Resources,
+    stored: &[StoredClip],
+    frames: &Range<usize>,
+    from_bytes: fn(&[u8]) -> multi_view::Result<T>,
+) -> Result<Vec<T>, JobError> {
+    let is_wanted = |clip: &&StoredClip| {
+        clip.first_frame < frames.end && clip.first_frame + clip.num_frames > frames.start
+    };
+    let mut read = Vec::new();
+    for clip in stored.iter().filter(is_wanted) {
+        let Object { store_key, blake3 } = &clip.object;
+        let input = Input { name: "a clip of a camera", store_key, blake3 };
+        let bytes = objects::read(&resources.store, input, MAX_BYTES).await?;
+        let clip = compute::run(move || from_bytes(&bytes)).await;
+        read.push(clip.map_err(JobError::retry)?);
+    }
+    Ok(read)
 }

@@ -24,7 +24,8 @@ pub use inverse_kinematics::{
 };
 pub use run_report::{Code, FileReport, MultiViewReport, SessionReport, TrackingParts};
 pub use silhouettes::{
-    CameraReport, ClipPlace, Members, Source, SourceKind, clip_name, file_part, picture_name, report_name,
+    CameraReport, ClipPlace, Members, Source, SourceKind, clip_name, file_part, matches_name, picture_name,
+    report_name,
 };
 
 use serde::{Deserialize, Serialize};

@@ -71,11 +71,14 @@ pub struct CameraReport {
     pub warnings: Vec<String>,
     /// the clips in their order
     pub clips: Vec<ClipPlace>,
+    /// clips of points that were found again from frame to frame, of the same frames; none where there are no pictures
+    #[serde(default)]
+    pub matches: Vec<ClipPlace>,
     /// what it took
     pub job: JobReport,
 }
 
-/// One clip of silhouettes.
+/// One clip of silhouettes, or of points.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClipPlace {
     /// name of the artefact
@@ -94,6 +97,11 @@ pub fn report_name(index: usize) -> String {
 /// Name of the artefact with a clip of a camera.
 pub fn clip_name(index: usize, first_frame: usize) -> String {
     format!("clip-{index:03}-{first_frame:08}.sil")
+}
+
+/// Name of the artefact with the points of a camera that were found again, of the frames of a clip.
+pub fn matches_name(index: usize, first_frame: usize) -> String {
+    format!("matches-{index:03}-{first_frame:08}.mat")
 }
 
 /// Name of the artefact with the picture of a frame of a camera.

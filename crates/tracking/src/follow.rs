@@ -6,7 +6,7 @@ use std::{
 };
 
 use body::{BodyModel, Posed, Shape};
-use model::{Camera, Silhouette};
+use model::{Camera, PointMatch, Silhouette};
 
 use crate::{Chunk, Error, ObservedFrame, Stage, Tracked, Tracker};
 
@@ -15,12 +15,31 @@ const RETRY: usize = 6;
 /// A frame with misaligned limbs whose body covers less of the silhouettes lost the person.
 const LOST: f64 = 0.6;
 
+/// What was seen in a frame.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    /// every camera with its silhouette
+    pub views: Vec<(Camera, Silhouette)>,
+    /// points that each camera found again, in the order of the cameras; may be empty
+    pub matches: Vec<Vec<PointMatch>>,
+}
+
+impl Seen {
+    fn observed(&self, frame: usize) -> Result<ObservedFrame, Error> {
+        let mut observed = ObservedFrame::new(frame, &self.views)?;
+        for (camera, matches) in self.matches.iter().enumerate() {
+            observed = observed.with_matches(camera, matches);
+        }
+        Ok(observed)
+    }
+}
+
 /// Where frames come from, and how a person is found without a start.
-pub struct Footage<V, F> {
+pub struct Footage<S, F> {
     /// numbers of the frames
     pub frames: Range<usize>,
-    /// what the cameras saw in a frame; may be asked for the same frame again
-    pub views: V,
+    /// what was seen in a frame; may be asked for the same frame again
+    pub see: S,
     /// the pose in what cameras saw, shape `[dofs]`, as `shape_fit::fit_pose` finds it
     pub find: F,
 }
@@ -30,37 +49,37 @@ pub struct Footage<V, F> {
 /// frame near them, so that there is a result for each frame, whatever was seen. `each` is told how many frames are done.
 ///
 /// # Errors
-/// [`Error::View`] and [`Error::Stopped`] as from [`Tracker::track`], and those of `views`.
-pub fn follow<V, F, E>(
+/// [`Error::View`] and [`Error::Stopped`] as from [`Tracker::track`], and those of `see`.
+pub fn follow<S, F, E>(
     tracker: &mut Tracker<'_>,
-    footage: Footage<V, F>,
+    footage: Footage<S, F>,
     stop: &AtomicBool,
     mut each: impl FnMut(usize),
 ) -> Result<Chunk, E>
 where
-    V: FnMut(usize) -> Result<Vec<(Camera, Silhouette)>, E>,
+    S: FnMut(usize) -> Result<Seen, E>,
     F: FnMut(&[(Camera, Silhouette)]) -> Option<Vec<f64>>,
     E: From<Error>,
 {
-    let Footage { frames, mut views, mut find } = footage;
+    let Footage { frames, mut see, mut find } = footage;
     let mut tracked: Vec<Tracked> = Vec::with_capacity(frames.len());
     // frames from here on wait for a pose; none do while the person is followed
     let mut waiting = Some(frames.start);
     let mut next_try = frames.start;
     for frame in frames.clone() {
         each(frame - frames.start);
-        let seen = views(frame)?;
-        let observed = ObservedFrame::new(frame, &seen)?;
+        let seen = see(frame)?;
+        let observed = seen.observed(frame)?;
         if let Some(first) = waiting {
             let mut pose = None;
             if frame >= next_try && observed.num_views() > 1 {
                 check(stop, frame)?;
-                pose = find(&seen);
+                pose = find(&seen.views);
                 next_try = frame + RETRY;
             }
             let Some(pose) = pose else { continue };
             tracker.restart(&pose)?;
-            let back = backwards(tracker, first..frame, &mut views, stop)?;
+            let back = backwards(tracker, first..frame, &mut see, stop)?;
             tracked.extend(back);
             tracker.restart(&pose)?;
             waiting = None;
@@ -69,7 +88,7 @@ where
         if is_lost(&found) && frame >= next_try {
             next_try = frame + RETRY;
             check(stop, frame)?;
-            if let Some(pose) = find(&seen) {
+            if let Some(pose) = find(&seen.views) {
                 tracker.restart(&pose)?;
                 found = tracker.track(&observed, stop)?;
             }
@@ -82,7 +101,7 @@ where
     }
     if let Some(first) = waiting {
         for frame in first..frames.end {
-            tracked.push(unseen(tracker, frame, &views(frame)?, stop)?);
+            tracked.push(unseen(tracker, frame, &see(frame)?, stop)?);
         }
     }
     each(frames.len());
@@ -90,25 +109,25 @@ where
 }
 
 /// Tracks frames from the last to the first, as far as the person is there.
-fn backwards<V, E>(
+fn backwards<S, E>(
     tracker: &mut Tracker<'_>,
     frames: Range<usize>,
-    views: &mut V,
+    see: &mut S,
     stop: &AtomicBool,
 ) -> Result<Vec<Tracked>, E>
 where
-    V: FnMut(usize) -> Result<Vec<(Camera, Silhouette)>, E>,
+    S: FnMut(usize) -> Result<Seen, E>,
     E: From<Error>,
 {
     let mut tracked = Vec::with_capacity(frames.len());
     let mut is_gone = false;
     for frame in frames.rev() {
-        let seen = views(frame)?;
+        let seen = see(frame)?;
         let found = if is_gone {
             unseen(tracker, frame, &seen, stop)?
         } else {
             let before = tracker.pose().to_vec();
-            let found = tracker.track(&ObservedFrame::new(frame, &seen)?, stop)?;
+            let found = tracker.track(&seen.observed(frame)?, stop)?;
             is_gone = is_lost(&found) || found.stage == Stage::Unseen;
             if is_gone {
                 tracker.restart(&before)?;
@@ -132,13 +151,9 @@ fn is_lost(found: &Tracked) -> bool {
 }
 
 /// A frame in which the person was not found, whatever is in the silhouettes.
-fn unseen(
-    tracker: &mut Tracker<'_>,
-    frame: usize,
-    seen: &[(Camera, Silhouette)],
-    stop: &AtomicBool,
-) -> Result<Tracked, Error> {
+fn unseen(tracker: &mut Tracker<'_>, frame: usize, seen: &Seen, stop: &AtomicBool) -> Result<Tracked, Error> {
     let empty: Vec<_> = seen
+        .views
         .iter()
         .map(|(camera, silhouette)| {
             (camera.clone(), Silhouette::empty(silhouette.width(), silhouette.height()))

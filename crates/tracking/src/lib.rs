@@ -31,7 +31,7 @@ mod training_poses;
 
 pub use chunk::{Chunk, ChunkPlan, Merged, Seam, merge, plan_chunks, track_chunk, track_frames};
 pub use error::Error;
-pub use follow::{Footage, follow, hold_unseen};
+pub use follow::{Footage, Seen, follow, hold_unseen};
 pub use joint_limit_term::joint_limit_energy;
 pub use misalignment::{LimbError, Misalignment};
 pub use observed_frame::ObservedFrame;

@@ -10,8 +10,8 @@ use body::BodyModel;
 use model::{Camera, Silhouette};
 use moving::{cameras, distances, mixed, pose, seen};
 use tracking::{
-    Chunk, Error, Footage, ObservedFrame, Options, Stage, Tracker, follow, hold_unseen, merge, plan_chunks,
-    track_chunk,
+    Chunk, Error, Footage, ObservedFrame, Options, Seen, Stage, Tracker, follow, hold_unseen, merge,
+    plan_chunks, track_chunk,
 };
 use vision::scene::SilhouetteNoise;
 
@@ -190,9 +190,10 @@ fn a_person_who_comes_late_and_leaves_is_followed_from_where_they_are_found() {
     let mut tries = 0;
     let footage = Footage {
         frames: 0..motion.len(),
-        views: |frame: usize| {
+        see: |frame: usize| {
             let (views, _) = &frames[frame];
-            Ok::<_, Error>(if is_empty(frame) { empty(views) } else { views.clone() })
+            let views = if is_empty(frame) { empty(views) } else { views.clone() };
+            Ok::<_, Error>(Seen { views, matches: Vec::new() })
         },
         find: |views: &[(Camera, Silhouette)]| {
             tries += 1;
@@ -229,7 +230,7 @@ fn following_stops_when_it_is_told_to() {
     let (views, _) = seen(&model, &shape, &pose, &cameras(2));
     let footage = Footage {
         frames: 3..9,
-        views: |_| Ok::<_, Error>(views.clone()),
+        see: |_| Ok::<_, Error>(Seen { views: views.clone(), matches: Vec::new() }),
         find: |_: &[(Camera, Silhouette)]| Some(pose.clone()),
     };
     let mut tracker = Tracker::new(&model, &[], &pose, Options::default()).unwrap();

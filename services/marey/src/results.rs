@@ -15,7 +15,8 @@ use crate::{
 /// Download what a run has made
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:
-  marey results 0198… -o take3/        then open take3/motion.bvh in Blender: File > Import > Motion Capture (.bvh)")]
+  marey results 0198… -o take3/        then open take3/motion.bvh in Blender: File > Import > Motion Capture (.bvh);
+                                       of cameras: look at take3/overlay_CAMERA.mp4, open take3/body.glb")]
 pub struct Args {
     /// The run's id
     run: String,

@@ -9,7 +9,7 @@ use crate::{
     marker_sets, watch,
 };
 
-/// Reconstruct a session: motion from control points, or a body from what cameras saw
+/// Reconstruct a session: motion from control points, or a body and its motion from what cameras saw
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey run \"take 3\" --database walks --watch
@@ -20,6 +20,8 @@ use crate::{
   marey run \"take 3\" --database walks --set chunk_frames=1200
   marey run \"take 4\" --watch                                  (a session with cameras)
   marey run \"take 4\" --cameras cam01,cam02,cam03 --camera GX010042.MP4=cam01
+  marey run \"take 4\" --set frame_rate=60 --set particles=50
+  marey run \"take 4\" --set track=false                       (the body in the first frame alone)
   marey run \"take 5\" --kind inverse-kinematics --stature 1.78 --sex male --watch")]
 pub struct Args {
     /// The session: its name or id

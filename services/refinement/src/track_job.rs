@@ -12,7 +12,7 @@ use service::{
     compute::{self, StopOnDrop},
     objects,
 };
-use tracking::{Chunk, Footage, Tracker, follow};
+use tracking::{Chunk, Footage, Seen, Tracker, follow};
 
 use crate::{InputError, Shared, options};
 
@@ -94,7 +94,10 @@ fn track(
     let num_frames = payload.end - payload.start;
     let footage = Footage {
         frames: payload.start..payload.end,
-        views: |frame| Ok::<_, InputError>(silhouettes.views(frame)?),
+        see: |frame| {
+            let (views, matches) = (silhouettes.views(frame)?, silhouettes.matches(frame)?);
+            Ok::<_, InputError>(Seen { views, matches })
+        },
         find: |views: &[View]| {
             let found = shape_fit::fit_pose(model, &session.alpha, views, &fit_options);
             found.ok().map(|fit| fit.pose)

@@ -3,9 +3,10 @@
 use std::sync::{Arc, atomic::AtomicBool};
 
 use background::{CameraQuality, Segmenter};
+use features::FeatureTracker;
 use formats::{archive::Entry, image_files};
 use model::{Image, Silhouette};
-use multi_view::{ClipWriter, Parameters};
+use multi_view::{ClipWriter, MatchClipWriter, Parameters};
 use service::FileError;
 
 use crate::{
@@ -20,8 +21,8 @@ const SAMPLE_BYTES: usize = 400 << 20;
 
 /// What comes out, piece by piece.
 pub(crate) enum Piece {
-    /// packed silhouettes
-    Clip { first_frame: usize, num_frames: usize, bytes: Vec<u8> },
+    /// packed silhouettes, and packed points that were found again
+    Clip { first_frame: usize, num_frames: usize, bytes: Vec<u8>, matches: Option<Vec<u8>> },
     /// what the camera saw in the first frame, and the silhouette made of it
     Picture { frame: usize, image: Image, silhouette: Silhouette },
 }
@@ -45,6 +46,9 @@ struct Packer<'a, S> {
     frame: usize,
     expected: Option<usize>,
     clip: Option<ClipWriter>,
+    /// where points are looked for in the pictures
+    features: Option<FeatureTracker>,
+    matches: Option<MatchClipWriter>,
     sink: &'a mut S,
 }
 
@@ -55,12 +59,30 @@ impl<'a, S: Sink> Packer<'a, S> {
             (Some(left), Some(asked)) => Some(left.min(asked)),
             (left, asked) => left.or(asked),
         };
-        Self { parameters, frame: parameters.first_frame, expected, clip: None, sink }
+        Self {
+            parameters,
+            frame: parameters.first_frame,
+            expected,
+            clip: None,
+            features: None,
+            matches: None,
+            sink,
+        }
     }
 
     /// Whether as many frames came as were asked for.
     fn is_full(&self) -> bool {
         self.parameters.num_frames.is_some_and(|most| self.frame - self.parameters.first_frame >= most)
+    }
+
+    /// Takes the next picture and the silhouette in it; false to stop.
+    fn push_picture(&mut self, silhouette: &Silhouette, picture: &Image) -> Result<bool, InputError> {
+        if let Some(features) = &mut self.features {
+            let (width, height) = (silhouette.width(), silhouette.height());
+            let clip = self.matches.get_or_insert_with(|| MatchClipWriter::new(width, height, self.frame));
+            clip.push(&features.push(picture, silhouette))?;
+        }
+        self.push(silhouette, || picture.clone())
     }
 
     /// Takes the silhouette of the next frame; false to stop.
@@ -86,7 +108,8 @@ impl<'a, S: Sink> Packer<'a, S> {
         let Some(clip) = self.clip.take() else { return true };
         let num_frames = clip.num_frames();
         let first_frame = self.frame - num_frames;
-        self.sink.piece(Piece::Clip { first_frame, num_frames, bytes: clip.finish() })
+        let matches = self.matches.take().map(MatchClipWriter::finish);
+        self.sink.piece(Piece::Clip { first_frame, num_frames, bytes: clip.finish(), matches })
     }
 
     /// Ends the last clip; refuses to end before the first frame.
@@ -185,10 +208,13 @@ pub(crate) fn of_frames(
     let mut stream = frames.open(1, cancelled)?;
     stream.skip(parameters.first_frame)?;
     let mut packer = Packer::new(parameters, announced.count, sink);
+    if parameters.track && parameters.texture {
+        packer.features = Some(FeatureTracker::default());
+    }
     let mut frame = Image::black(0, 0);
     while !packer.is_full() && stream.next(&mut frame)? {
         let (person, _) = segmenter.segment(&frame).map_err(in_file)?;
-        if !packer.push(person, || frame.clone())? {
+        if !packer.push_picture(person, &frame)? {
             return Ok(None);
         }
     }

@@ -11,7 +11,9 @@ use std::{
 use formats::{calibration::fit_to_image, image_files};
 use model::Image;
 use multi_view::CameraRecord;
-use payloads::{CameraReport, ClipPlace, Source, clip_name, file_part, picture_name, report_name};
+use payloads::{
+    CameraReport, ClipPlace, Source, clip_name, file_part, matches_name, picture_name, report_name,
+};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{FileError, compute, objects};
 use tempfile::TempDir;
@@ -69,6 +71,7 @@ impl Handler for SilhouettesHandler {
             quality: made.made.quality,
             warnings: made.made.warnings,
             clips: written.clips,
+            matches: written.matches,
             job: resources.job_report(&job, started, made.made.end_frame - payload.parameters.first_frame),
         };
         let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
@@ -87,6 +90,7 @@ struct OfCamera {
 struct Written {
     artefacts: Vec<Artefact>,
     clips: Vec<ClipPlace>,
+    matches: Vec<ClipPlace>,
 }
 
 impl SilhouettesHandler {
@@ -140,11 +144,18 @@ impl SilhouettesHandler {
     ) -> Result<(), JobError> {
         let store = &self.shared.resources.store;
         match piece {
-            Piece::Clip { first_frame, num_frames, bytes } => {
+            Piece::Clip { first_frame, num_frames, bytes, matches } => {
                 let name = clip_name(payload.index, first_frame);
                 let artefact = objects::write(store, job, &name, "application/octet-stream", bytes).await?;
                 written.artefacts.push(artefact);
                 written.clips.push(ClipPlace { name, first_frame, num_frames });
+                if let Some(bytes) = matches {
+                    let name = matches_name(payload.index, first_frame);
+                    let artefact =
+                        objects::write(store, job, &name, "application/octet-stream", bytes).await?;
+                    written.artefacts.push(artefact);
+                    written.matches.push(ClipPlace { name, first_frame, num_frames });
+                }
             }
             Piece::Picture { frame, mut image, silhouette } => {
                 let (plain, drawn) = compute::run(move || {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, ensure};
 use body::{BodyModel, Posed};
 use formats::{PointsOptions, image_files, points_csv};
-use model::{Image, Mesh, PointTrajectories};
+use model::{Camera, Image, Mesh, PointTrajectories, Silhouette};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use tests::{Api, System};
@@ -21,6 +21,9 @@ const FRAMES: usize = 9;
 struct Take {
     calibration: String,
     masks: Vec<u8>,
+    cameras: Vec<Camera>,
+    /// shape `[frames][cameras]`
+    seen: Vec<Vec<Silhouette>>,
     truth: Vec<Vec<Vector3<f64>>>,
     joint_names: Vec<String>,
 }
@@ -36,8 +39,8 @@ fn take(empty: usize) -> Result<Take> {
         dof("l_elbow")?,
         [dof("l_hip_flex")?, dof("r_hip_flex")?],
     );
-    let (mut files, mut truth) = (Vec::new(), Vec::new());
-    let nobody = image_files::write_silhouette(&model::Silhouette::empty(402, 402));
+    let (mut files, mut seen, mut truth) = (Vec::new(), Vec::new(), Vec::new());
+    let nobody = image_files::write_silhouette(&Silhouette::empty(402, 402));
     for (camera, frame) in cameras.iter().flat_map(|camera| (0..empty).map(move |frame| (camera, frame))) {
         files.push((format!("{}/{frame:04}.png", camera.name), nobody.clone()));
     }
@@ -51,10 +54,12 @@ fn take(empty: usize) -> Result<Take> {
         (pose[legs[0]], pose[legs[1]]) = (0.4 * share, -0.2 * share);
         shape.pose(&model, &pose, &mut posed);
         let mesh = Mesh::new(posed.vertices.clone(), model.faces().to_vec())?;
-        for (camera, mask) in cameras.iter().zip(silhouettes(&mesh, &cameras)) {
+        let of_frame = silhouettes(&mesh, &cameras);
+        for (camera, mask) in cameras.iter().zip(&of_frame) {
             let name = format!("{}/{:04}.png", camera.name, empty + frame);
-            files.push((name, image_files::write_silhouette(&mask)));
+            files.push((name, image_files::write_silhouette(mask)));
         }
+        seen.push(of_frame);
         truth.push(posed.joints.clone());
     }
     let files: Vec<(&str, &[u8])> =
@@ -63,11 +68,41 @@ fn take(empty: usize) -> Result<Take> {
         calibration: formats::calibration::write(&cameras),
         masks: tar(&files)?,
         truth,
+        cameras,
+        seen,
         joint_names: model.rig().joints().iter().map(|joint| joint.name.clone()).collect(),
     })
 }
 
 impl Take {
+    /// The same as pictures, of a person in patterned clothes before a wall, and of the wall.
+    fn upload_pictures(&self, api: &Api) -> Result<String> {
+        let (mut pictures, mut plates) = (Vec::new(), Vec::new());
+        for (index, camera) in self.cameras.iter().enumerate() {
+            let wall = painted(&Silhouette::empty(402, 402), [0, 0]);
+            plates.push((format!("{}.png", camera.name), image_files::write_image(&wall)));
+            for (frame, joints) in self.truth.iter().enumerate() {
+                let pelvis = camera.project(&joints[0]).context("behind the camera")?;
+                let picture =
+                    painted(&self.seen[frame][index], [pelvis.x, pelvis.y].map(|x| x.round() as i64));
+                pictures
+                    .push((format!("{}/{frame:04}.png", camera.name), image_files::write_image(&picture)));
+            }
+        }
+        let [pictures, plates] = [pictures, plates].map(|files| {
+            tar(&files.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice())).collect::<Vec<_>>())
+        });
+        let (pictures, plates) = (pictures?, plates?);
+        api.session(
+            "take",
+            &[
+                ("calibration.json", self.calibration.as_bytes()),
+                ("images.tar", &pictures),
+                ("plates.tar", &plates),
+            ],
+        )
+    }
+
     fn upload(&self, api: &Api) -> Result<String> {
         let files = [("calibration.json", self.calibration.as_bytes()), ("masks.tar", self.masks.as_slice())];
         api.session("take", &files)
@@ -85,6 +120,23 @@ impl Take {
         }
         Ok([sum / (FRAMES * self.joint_names.len()) as f64, most])
     }
+}
+
+/// A person in a pattern of blocks that moves along with `origin` (a pixel), before a wall.
+fn painted(mask: &Silhouette, origin: [i64; 2]) -> Image {
+    let mut picture = Image::black(mask.width(), mask.height());
+    for y in 0..mask.height() {
+        for x in 0..mask.width() {
+            let wall = 70 + ((x / 40 + y / 40) % 2) as u8 * 12;
+            let [block_x, block_y] =
+                [(x as i64 - origin[0]).div_euclid(6), (y as i64 - origin[1]).div_euclid(6)];
+            let hash = (block_x * 7919 + block_y * 104_729).wrapping_mul(2_654_435_761) >> 7;
+            let [red, green] = [(hash & 0x3f) as u8, (hash >> 6 & 0x3f) as u8];
+            let is_person = mask.contains(x as isize, y as isize);
+            picture.set(x, y, if is_person { [190 + red, 20 + green, 200] } else { [wall; 3] });
+        }
+    }
+    picture
 }
 
 /// Two chunks of what there is.
@@ -225,5 +277,26 @@ fn tracking_is_cancelled_and_a_person_who_is_not_there_yet_is_waited_for() -> Re
     assert_eq!(report["tracking"]["frames_by_stage"]["unseen"], 2, "{}", report["tracking"]);
     let warnings = report["warnings"].to_string();
     assert!(warnings.contains("nobody was found in 2 of 11 frames (frames 0–1)"), "{warnings}");
+    Ok(())
+}
+
+#[test]
+fn a_person_in_pictures_is_followed_by_the_pattern_of_their_clothes_too() -> Result<()> {
+    let take = take(0)?;
+    let system = System::with_cameras(2)?;
+    let api = system.project("p")?;
+    let session = take.upload_pictures(&api)?;
+    let tracked = |texture: bool| -> Result<Vec<u8>> {
+        let parameters = json!({"texture": texture, "overlay": false, "frame_rate": 25});
+        let run = api.start_run(&session, &json!({ "parameters": parameters }))?;
+        let end = api.wait(&run)?;
+        ensure!(end["state"] == "succeeded", "{end}");
+        let joints = api.get(&format!("{run}/results/joints.csv"))?.body;
+        let [mean, most] = take.errors(&points_csv::read(&joints)?.value)?;
+        println!("texture {texture}: joints: mean {:.1} mm, largest {:.1} mm", 1e3 * mean, 1e3 * most);
+        assert!(mean < 0.03 && most < 0.1, "{mean} {most}");
+        Ok(joints)
+    };
+    assert!(tracked(true)? != tracked(false)?, "the pattern was not looked at");
     Ok(())
 }

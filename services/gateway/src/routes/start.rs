@@ -99,8 +99,13 @@ pub(crate) struct NewReconstruction {
     /// neighbours that the regression learns from
     #[schema(example = 64)]
     neighbours: Option<u32>,
-    /// further parameters of the method, by name
+    /// further parameters of the method, by name. For cameras among others: `track` (false: the body in the first frame
+    /// alone), `first_frame`, `num_frames`, `frame_rate` (where no video tells it), `chunk_frames` and `overlap_frames`
+    /// (frames that are tracked in one piece, and that it goes on into the next), `particles` (0: none), `iterations`, `prior`
+    /// and `seed` of the search for limbs that do not fit, `texture` (points are followed in the pictures), `overlay` (a video
+    /// of each camera)
     #[serde(default)]
+    #[schema(example = json!({"chunk_frames": 150, "particles": 25}))]
     parameters: Map<String, Value>,
 }
 
