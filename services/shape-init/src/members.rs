@@ -133,7 +133,7 @@ mod tests {
         assert_eq!(groups(&names(&["0000.png", "0001.png"])), [folder("")]);
         let found = groups(&names(&["cam1_0000.png", "cam1_0001.png", "cam2_0000.png"]));
         assert_eq!(found.len(), 2);
-        assert!(found[1].has("cam2_0000.png") && !found[1].has("cam1_0000.png"));
+        assert!(has(&found[1], "cam2_0000.png") && !has(&found[1], "cam1_0000.png"));
     }
 
     #[test]
