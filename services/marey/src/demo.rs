@@ -1,5 +1,7 @@
 //! `marey demo`: the whole way, once, on motion whose truth is known.
 
+mod cameras;
+
 use std::{
     fs,
     io::Write,
@@ -38,8 +40,8 @@ const METHODS: [&str; 2] = ["local-regression", "nearest"];
 /// Show what Marey does, on motion of its own or on yours
 ///
 /// Starts everything, builds a motion database, and reconstructs trials that are not in it from 4 and 6 of their points;
-/// then says how far the result is from the truth, and how far that of a plain baseline is. Without --data, it is shown
-/// on synthetic motion.
+/// then follows a synthetic person through the silhouettes of four cameras. Says how far the results are from the truth,
+/// and how far those of a plain baseline are. Without --data, all of it is shown on synthetic motion.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder with recordings: ASF and AMC, or BVH, also .zst or .gz
@@ -60,7 +62,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let begin = Instant::now();
         let folder = Path::new(FOLDER);
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        step("Starting PostgreSQL, the gateway, motion-index and reconstruction");
+        step("Starting PostgreSQL, the gateway and all services");
         let up = up::Args { data_dir: folder.to_owned(), listen: ([127, 0, 0, 1], 0).into(), workers: None };
         let Some(everything) = Everything::start(&up, shutdown.clone()).await? else { return Ok(()) };
         let client = Client::new(everything.server.clone());
@@ -148,10 +150,12 @@ fn show(client: &Client, data: Option<&Path>, folder: &Path) -> anyhow::Result<(
     print_table(&rows);
     let synthetic = if data.is_none() { " The motion is synthetic; recorded motion is harder." } else { "" };
     println!("\nErrors are against the true motion, which was not used.{synthetic}");
+    cameras::show(client, folder, &output)?;
     println!("\nEverything is in {}:", output.canonicalize().unwrap_or(output.clone()).display());
     for row in &rows {
         println!("  {}", row.asked.folder());
     }
+    println!("  {}", cameras::FOLDER);
     println!(
         "To look at one: in Blender, File > Import > Motion Capture (.bvh), then take its motion.bvh and press play."
     );

@@ -89,12 +89,16 @@ pub struct SampleCapture {
 }
 
 impl SampleCapture {
+    /// Stature of the person, metres.
+    pub fn stature_m(&self) -> f64 {
+        STATURES_M[(self.seed % STATURES_M.len() as u64) as usize]
+    }
+
     /// Writes it into a folder: `calibration.json`, `silhouettes/CAMERA/FRAME.png`, `groundtruth/joints.json` and
     /// `groundtruth/mesh_FRAME.ply`, and tells every frame when it is done.
     pub fn write(&self, folder: &Path, mut frame_done: impl FnMut()) -> anyhow::Result<()> {
         let model = BodyModel::shipped();
-        let stature_m = STATURES_M[(self.seed % STATURES_M.len() as u64) as usize];
-        let alpha = model.alpha_for(&Wanted { stature_m: Some(stature_m), ..Wanted::default() })?;
+        let alpha = model.alpha_for(&Wanted { stature_m: Some(self.stature_m()), ..Wanted::default() })?;
         let shape = model.shape(&alpha);
         let options = DrawOptions { frames: (self.frames * STEP).max(8), subject: self.seed };
         let motion = Model::bundled().draw(self.action, self.seed, &options)?;
