@@ -51,7 +51,9 @@ impl CameraClips {
             let object = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
             Ok(StoredClip { first_frame: place.first_frame, num_frames: place.num_frames, object })
         };
-        let all = |places: &[payloads::ClipPlace]| places.iter().map(stored).collect::<Result<Vec<StoredClip>, JobError>>();
+        let all = |places: &[payloads::ClipPlace]| {
+            places.iter().map(stored).collect::<Result<Vec<StoredClip>, JobError>>()
+        };
         let (clips, matches) = (all(&report.clips)?, all(&report.matches)?);
         Ok(Self { camera: report.camera.clone(), clips, matches })
     }

@@ -110,12 +110,12 @@ impl WithSimd for Sum<'_> {
     fn with_simd<S: Simd>(self, _simd: S) -> Bins {
         let Self { grid, inside } = self;
         let mut bins = [[[0.0; DIRECTIONS]; PLACES + 2]; PLACES + 2];
-        for row in 0..SIDE {
+        for (row, inside) in inside.iter().enumerate() {
             let (above, here, below) = (&grid.values[row], &grid.values[row + 1], &grid.values[row + 2]);
             let (mut lengths, mut turns) = ([0.0f32; SIDE], [0.0f32; SIDE]);
             for i in 0..SIDE {
                 let (across, down) = (here[i + 2] - here[i], below[i + 1] - above[i + 1]);
-                lengths[i] = inside[row][i] * grid.weights[i] * (across * across + down * down).sqrt();
+                lengths[i] = inside[i] * grid.weights[i] * (across * across + down * down).sqrt();
                 turns[i] = angle(across, down) * (DIRECTIONS as f32 / std::f32::consts::TAU);
             }
             let (weight, place, share) = (grid.weights[row], grid.places[row], grid.shares[row]);

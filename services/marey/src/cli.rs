@@ -47,7 +47,7 @@ enum Command {
     #[command(subcommand)]
     Body(body::Command),
     Upload(upload::Args),
-    Run(run::Args),
+    Run(Box<run::Args>),
     Markers(marker_sets::Args),
     Results(results::Args),
     Status(status::Args),

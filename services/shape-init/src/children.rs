@@ -9,8 +9,10 @@ use tracking::plan_chunks;
 
 /// Attempts of a chunk: more than usual, as one may be lost with each worker that is taken away.
 const CHUNK_ATTEMPTS: i32 = 5;
-/// Weight of jobs in the run's progress: tracked frames for a weight of 1.
-const FRAMES_PER_WEIGHT: f64 = 30.0;
+/// Weight of the job that enqueues these, and the share of it that it shows while it runs: a run's progress never goes back, so
+/// room is kept for jobs that are not there yet.
+pub(crate) const INITIALISE_WEIGHT: f64 = 12.0;
+pub(crate) const INITIALISE_SHOWN: f64 = 0.15;
 /// Frames that are merged, and frames that are drawn for one camera, in the time of one that is tracked.
 const MERGE_SPEED: f64 = 50.0;
 const DRAW_SPEED: f64 = 8.0;
@@ -21,6 +23,10 @@ pub(crate) fn of(session: &TrackingSession, object: &Object) -> Result<Vec<Child
     let parameters = &session.request.parameters;
     let num_frames = session.end_frame - session.first_frame;
     let chunks = plan_chunks(num_frames, parameters.chunk_frames, parameters.overlap_frames);
+    let num_videos = if parameters.overlay { session.cameras.len() } else { 0 };
+    let tracked: usize = chunks.iter().map(|chunk| chunk.end - chunk.first).sum();
+    let frames = tracked as f64 + num_frames as f64 * (1.0 / MERGE_SPEED + num_videos as f64 / DRAW_SPEED);
+    let of_frame = weight_of_all(session.cameras.len()) / frames.max(1.0);
     let (num_chunks, mut jobs) = (chunks.len(), Vec::new());
     for (index, chunk) in chunks.into_iter().enumerate() {
         let payload = TrackChunk {
@@ -31,17 +37,40 @@ pub(crate) fn of(session: &TrackingSession, object: &Object) -> Result<Vec<Child
             end: session.first_frame + chunk.end,
         };
         let payload = serde_json::to_value(payload).map_err(JobError::retry)?;
-        let weight = (chunk.end - chunk.first) as f64 / FRAMES_PER_WEIGHT;
+        let weight = (chunk.end - chunk.first) as f64 * of_frame;
         jobs.push(ChildJob::new(TRACK_CHUNK, payload).weight(weight).max_attempts(CHUNK_ATTEMPTS));
     }
-    let weight = num_frames as f64 / FRAMES_PER_WEIGHT;
+    let weight = num_frames as f64 * of_frame;
     let merge = serde_json::to_value(MergeTracks { session: object.clone() }).map_err(JobError::retry)?;
     jobs.push(ChildJob::new(MERGE_TRACKS, merge).weight(weight / MERGE_SPEED).depends_on(0..num_chunks));
-    for camera in 0..if parameters.overlay { session.cameras.len() } else { 0 } {
+    for camera in 0..num_videos {
         let payload = DrawOverlay { session: object.clone(), camera };
         let payload = serde_json::to_value(payload).map_err(JobError::retry)?;
         let job = ChildJob::new(DRAW_OVERLAY, payload).weight(weight / DRAW_SPEED);
         jobs.push(job.depends_on([num_chunks]));
     }
     Ok(jobs)
+}
+
+/// Weight of all these jobs: so much that the run's progress, when they come in and their parent is done, stays where it was.
+fn weight_of_all(num_cameras: usize) -> f64 {
+    // the plan and the jobs of the cameras weigh 1 each
+    let others = 1.0 + num_cameras as f64;
+    let done = others + INITIALISE_WEIGHT;
+    done * done / (others + INITIALISE_SHOWN * INITIALISE_WEIGHT) - done
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn progress_goes_on_where_it_was_when_the_jobs_come_in() {
+        for cameras in [2, 4, 16] {
+            let before = 1.0 + cameras as f64 + INITIALISE_WEIGHT;
+            let shown = (1.0 + cameras as f64 + INITIALISE_SHOWN * INITIALISE_WEIGHT) / before;
+            let after = before / (before + weight_of_all(cameras));
+            assert!((shown - after).abs() < 1e-12 && (0.2..0.7).contains(&shown), "{shown} then {after}");
+        }
+    }
 }

@@ -55,7 +55,9 @@ impl Handler for InitialiseHandler {
         let Shared { resources, models } = &*self.shared;
         objects::clean_up_earlier_attempts(&resources.store, &job).await;
         let InitialiseBody { request, mut warnings, plan } = job.payload()?;
-        job.progress(0.0, "reading the silhouettes");
+        let shown = if request.parameters.track { children::INITIALISE_SHOWN } else { 1.0 };
+        let progress = |share: f64, phrase: &str| job.progress(shown * share, phrase);
+        progress(0.0, "reading the silhouettes");
         let artefacts = resources.artefacts_before(&job).await?;
         let cameras = reports(resources, &artefacts).await?;
         warnings.extend(cameras.iter().flat_map(|camera| camera.warnings.iter().cloned()));
@@ -65,7 +67,7 @@ impl Handler for InitialiseHandler {
         let end_frame = end_frame(&cameras, &mut warnings);
         let model = models.get(&request.body_model).await?;
         job.check()?;
-        job.progress(0.1, "finding pose and shape");
+        progress(0.1, "finding pose and shape");
         let parameters = &request.parameters;
         let found = self.find(&job, &model, parameters, &clips, end_frame).await;
         let found = found.map_err(|error| explained(error, &cameras))?;
@@ -74,7 +76,7 @@ impl Handler for InitialiseHandler {
         let (moments, fits) = (Arc::new(moments), Arc::new(fits));
         warnings.extend(left_out);
         warnings.extend(doubts(&fits));
-        job.progress(0.7, "carving the visual hull");
+        progress(0.7, "carving the visual hull");
         let (of, cell_m) = (moments.clone(), parameters.hull_voxel_m);
         let carved = compute::run(move || of.first().map(|first| hull(&first.views, cell_m))).await;
         job.check()?;
@@ -85,7 +87,7 @@ impl Handler for InitialiseHandler {
             Some(Err(error)) => warnings.push(format!("no visual hull: {error}")),
             None => {}
         }
-        job.progress(0.8, "writing the body");
+        progress(0.8, "writing the body");
         let frame_rate = frame_rate(parameters, &cameras, &mut warnings);
         files.extend(self.body(&model, &moments, &fits, frame_rate, &warnings).await?);
         if parameters.track {
@@ -98,7 +100,7 @@ impl Handler for InitialiseHandler {
         }
         for (index, camera) in cameras.iter().enumerate() {
             job.check()?;
-            job.progress(0.85 + 0.14 * index as f64 / cameras.len() as f64, "drawing overlays");
+            progress(0.85 + 0.14 * index as f64 / cameras.len() as f64, "drawing overlays");
             if let Some(file) = self.overlay(camera, &artefacts, &moments, (&model, &fits)).await? {
                 artefacts_of_results.push(self.write(&job, file).await?);
             }

@@ -14,7 +14,9 @@ use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{FileError, compute};
 
 use crate::{
-    INITIALISE_BODY, InputError, MAKE_SILHOUETTES, Shared, members,
+    INITIALISE_BODY, InputError, MAKE_SILHOUETTES, Shared,
+    children::INITIALISE_WEIGHT,
+    members,
     payload::{InitialiseBody, MakeSilhouettes},
     sources::{self, CameraSources},
 };
@@ -23,7 +25,7 @@ use crate::{
 const MAX_CALIBRATION_BYTES: u64 = 64 << 20;
 /// Attempts of a camera: more than usual, as one may be lost with each worker that is taken away.
 const CAMERA_ATTEMPTS: i32 = 5;
-/// Share of the last job in the run's progress; that of a camera is 1.
+/// Share of the last job in the run's progress, where nothing follows it; that of a camera is 1.
 const LAST_WEIGHT: f64 = 2.0;
 
 pub(crate) struct PlanHandler {
@@ -144,6 +146,8 @@ fn children(
     plan: JobReport,
 ) -> Result<Vec<ChildJob>, JobError> {
     let num_cameras = matched.len();
+    let goes_on = request.parameters.track && request.inverse_kinematics.is_none();
+    let last_weight = if goes_on { INITIALISE_WEIGHT } else { LAST_WEIGHT };
     let mut jobs = Vec::with_capacity(num_cameras + 1);
     for (index, of) in matched.into_iter().enumerate() {
         let payload = MakeSilhouettes {
@@ -172,6 +176,6 @@ fn children(
         None => (INITIALISE_BODY, serde_json::to_value(InitialiseBody { request, warnings, plan })),
     };
     let payload = payload.map_err(JobError::retry)?;
-    jobs.push(ChildJob::new(kind, payload).weight(LAST_WEIGHT).depends_on(0..num_cameras));
+    jobs.push(ChildJob::new(kind, payload).weight(last_weight).depends_on(0..num_cameras));
     Ok(jobs)
 }

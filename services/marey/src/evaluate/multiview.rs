@@ -204,7 +204,7 @@ impl<'a> Run<'a> {
         let tracked = self.tracker.track(frame, &stop)?;
         let track_ms = ms(started);
         let alone = self.without_particles.track(frame, &stop)?;
-        if self.time_search_every > 0 && frame.index % self.time_search_every == 0 {
+        if self.time_search_every > 0 && frame.index.is_multiple_of(self.time_search_every) {
             let misalignment = self.idle.misalignment(frame, &tracked.pose);
             let started = Instant::now();
             self.idle.search(frame, &tracked.pose, &tracked.pose, &misalignment, &|| true);
