@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use anyhow::{Context, Result};
+use serde_json::{Value, json};
 use tests::{Api, System};
 
 /// This program as `marey`, built beside the tests.
@@ -10,6 +11,10 @@ pub const MAREY: &str = env!("CARGO_BIN_EXE_marey-under-test");
 
 /// 1,200 frames at 60 a second, in 20 chunks.
 const FRAMES: usize = 2_400;
+
+/// 6,000 frames in 20 chunks, long enough to be interrupted in.
+const LONG_FRAMES: usize = 12_000;
+const LONG_CHUNK: u64 = 300;
 
 /// The workers that had chunks of a run, and the attempts that these took together.
 fn chunk_work(api: &Api, run: &str) -> Result<(usize, u64)> {
@@ -19,8 +24,8 @@ fn chunk_work(api: &Api, run: &str) -> Result<(usize, u64)> {
     Ok((jobs["workers"].as_array().map_or(0, Vec::len), jobs["attempts"].as_u64().unwrap_or(0)))
 }
 
-fn undisturbed(api: &Api, session: &str) -> Result<Vec<(String, Vec<u8>)>> {
-    let run = api.start_run(session, &crate::in_chunks())?;
+fn undisturbed(api: &Api, session: &str, request: &Value) -> Result<Vec<(String, Vec<u8>)>> {
+    let run = api.start_run(session, request)?;
     let end = api.wait(&run)?;
     anyhow::ensure!(end["state"] == "succeeded", "{end}");
     api.motion_files(&run)
@@ -40,7 +45,7 @@ fn the_result_does_not_depend_on_the_number_of_workers() -> Result<()> {
     let (system, api) = crate::own_system(0)?;
     let session = crate::session(&api, 31, FRAMES)?;
     let one = system.spawn(MAREY, "reconstruction", "only")?;
-    let alone = undisturbed(&api, &session)?;
+    let alone = undisturbed(&api, &session, &crate::in_chunks())?;
     drop(one);
     let _three = ["first", "second", "third"]
         .map(|name| system.spawn(MAREY, "reconstruction", name))
@@ -63,12 +68,14 @@ fn the_result_does_not_depend_on_the_number_of_workers() -> Result<()> {
 fn a_worker_killed_in_the_middle_of_a_run_costs_nothing_but_time() -> Result<()> {
     let (system, api) = crate::own_system(0)?;
     system.set_staleness(Duration::from_secs(1))?;
-    let session = crate::session(&api, 32, FRAMES)?;
+    let session = crate::session(&api, 32, LONG_FRAMES)?;
+    let parameters = json!({ "chunk_frames": LONG_CHUNK, "warm_up_frames": 30 });
+    let request = json!({ "motion_database": "walks", "parameters": parameters });
     let mut victim = system.spawn(MAREY, "reconstruction", "victim")?;
-    let expected = undisturbed(&api, &session)?;
+    let expected = undisturbed(&api, &session, &request)?;
     // Killed between two jobs nothing is lost: then it is tried again.
     for _ in 0..10 {
-        let run = api.start_run(&session, &crate::in_chunks())?;
+        let run = api.start_run(&session, &request)?;
         let event = api.wait_until(&run, |event| event["progress"].as_f64() > Some(0.2))?;
         assert_eq!(event["state"], "running", "{event}");
         victim.kill()?;
@@ -77,7 +84,7 @@ fn a_worker_killed_in_the_middle_of_a_run_costs_nothing_but_time() -> Result<()>
         assert_eq!(end["state"], "succeeded", "{end}");
         assert_same(&api.motion_files(&run)?, &expected);
         let (workers, attempts) = chunk_work(&api, &run)?;
-        if attempts > (FRAMES as u64 / 2).div_ceil(60) && workers == 2 {
+        if attempts > (LONG_FRAMES as u64 / 2).div_ceil(LONG_CHUNK) && workers == 2 {
             return Ok(());
         }
     }

@@ -138,7 +138,7 @@ fn a_run_is_cancelled_while_it_runs() -> Result<()> {
 #[test]
 fn progress_comes_as_events_that_rise_and_end() -> Result<()> {
     let api = crate::with_database();
-    let session = crate::session(api, 5, 2_400)?;
+    let session = crate::session(api, 5, 12_000)?;
     let run = api.start_run(&session, &crate::in_chunks())?;
     let seen = std::cell::RefCell::new(Vec::new());
     let end = api.wait_until(&run, |event| {
