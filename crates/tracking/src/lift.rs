@@ -29,7 +29,7 @@ pub struct SurfacePoint {
     pub origin: Vector3<f64>,
     /// direction of the ray, unit vector: d of the Plücker line, whose moment l is origin × d
     pub direction: Vector3<f64>,
-    /// weight among the points of its limb in its view, in (0, 1]
+    /// weight among the points of its limb in its view, less for points of long ago, in (0, 1]
     pub share: f64,
 }
 
@@ -115,7 +115,7 @@ fn share(model: &BodyModel, points: &mut [SurfacePoint]) {
     };
     let mut counts = [0.0f64; Limb::ALL.len()];
     points.iter().for_each(|point| counts[limb(point)] += 1.0);
-    points.iter_mut().for_each(|point| point.share = (POINTS_A_LIMB / counts[limb(point)]).min(1.0));
+    points.iter_mut().for_each(|point| point.share *= (POINTS_A_LIMB / counts[limb(point)]).min(1.0));
 }
 
 /// A posed body as a camera saw it.
@@ -142,13 +142,15 @@ impl Scene<'_> {
         // at lower resolution the face is that of the pixel or of a neighbour
         let around =
             (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x.saturating_add(dx), y.saturating_add(dy))));
+        // what was wrong with the pose then, and what changed since, grow with time
+        let share = 1.0 / f64::from(found.frames_back.max(1));
         let mut nearest: Option<(f64, SurfacePoint)> = None;
         for face in around.filter_map(|(x, y)| self.depths.face(x, y)) {
             let vertices = self.faces[face as usize];
             let corners = vertices.map(|vertex| self.vertices[vertex as usize]);
             let Some((distance, weights)) = crossing(&origin, &before, &corners) else { continue };
             if nearest.as_ref().is_none_or(|(least, _)| distance < *least) {
-                nearest = Some((distance, SurfacePoint { vertices, weights, origin, direction, share: 1.0 }));
+                nearest = Some((distance, SurfacePoint { vertices, weights, origin, direction, share }));
             }
         }
         nearest.map(|(_, point)| point)

@@ -181,18 +181,8 @@ impl<'a> Tracker<'a> {
         let last = self.last.clone();
         let goes_on = || !stop.load(Ordering::Relaxed);
         let starts = [prediction.as_slice(), last.as_slice()];
-        let mut uses_points = frame.views.iter().any(|view| !view.matches.is_empty());
-        let mut pose =
-            self.fitted(frame, &prediction, &starts, uses_points, &goes_on).ok_or(stopped.clone())?;
+        let mut pose = self.refine(frame, &prediction, &starts, &goes_on).ok_or(stopped.clone())?;
         let mut misalignment = self.misalignment(frame, &pose);
-        if misalignment.any() && uses_points {
-            // points may have been taken for those of another limb: silhouettes decide
-            let without = self.fitted(frame, &prediction, &starts, false, &goes_on).ok_or(stopped.clone())?;
-            let after = self.misalignment(frame, &without);
-            if after.total_m() < misalignment.total_m() {
-                (pose, misalignment, uses_points) = (without, after, false);
-            }
-        }
         let (mut stage, mut effective_sample_size) = (Stage::Local, None);
         if misalignment.any() {
             for attempt in [Attempt::AsAsked, Attempt::LimbByLimb] {
@@ -203,7 +193,7 @@ impl<'a> Tracker<'a> {
                 let found = self.attempt(frame, &prediction, &pose, &misalignment, attempt, &goes_on);
                 let Some(found) = found.ok_or(stopped.clone())? else { break };
                 effective_sample_size = Some(found.effective_sample_size);
-                let refined = self.fitted(frame, &prediction, &[&found.pose], uses_points, &goes_on);
+                let refined = self.refine(frame, &prediction, &[&found.pose], &goes_on);
                 let refined = refined.ok_or(stopped.clone())?;
                 let after = self.misalignment(frame, &refined);
                 if after.total_m() < misalignment.total_m() {
@@ -230,18 +220,7 @@ impl<'a> Tracker<'a> {
         starts: &[&[f64]],
         goes_on: &dyn Fn() -> bool,
     ) -> Option<Vec<f64>> {
-        self.fitted(frame, prediction, starts, true, goes_on)
-    }
-
-    fn fitted(
-        &mut self,
-        frame: &ObservedFrame,
-        prediction: &[f64],
-        starts: &[&[f64]],
-        uses_points: bool,
-        goes_on: &dyn Fn() -> bool,
-    ) -> Option<Vec<f64>> {
-        let points = match self.local.body.shape.as_ref().filter(|_| uses_points) {
+        let points = match &self.local.body.shape {
             Some(shape) => self.lifter.lift(self.model, &self.topology, shape, frame),
             None => vec![Vec::new(); frame.num_views()],
         };
