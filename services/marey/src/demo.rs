@@ -40,7 +40,7 @@ const METHODS: [&str; 2] = ["local-regression", "nearest"];
 /// Show what Marey does, on motion of its own or on yours
 ///
 /// Starts everything, builds a motion database, and reconstructs trials that are not in it from 4 and 6 of their points;
-/// then follows a synthetic person through the silhouettes of four cameras. Says how far the results are from the truth,
+/// then follows a synthetic person through the silhouettes of six cameras. Says how far the results are from the truth,
 /// and how far those of a plain baseline are. Without --data, all of it is shown on synthetic motion.
 #[derive(Debug, clap::Args)]
 pub struct Args {

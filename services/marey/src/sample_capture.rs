@@ -34,7 +34,7 @@ const STATURES_M: [f64; 5] = [1.58, 1.66, 1.73, 1.79, 1.86];
 /// exact.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:
-  marey sample-capture --out capture/ --cameras 4 --action walk
+  marey sample-capture --out capture/ --cameras 6 --action walk
   marey upload \"synthetic walk\" capture/calibration.json capture/silhouettes/
   marey run \"synthetic walk\" --watch")]
 pub struct Args {
@@ -42,7 +42,7 @@ pub struct Args {
     #[arg(long)]
     out: PathBuf,
     /// Cameras, in a circle around the person
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(2..=32))]
+    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(2..=32))]
     cameras: u32,
     /// Frames, at 30 a second
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=100_000))]

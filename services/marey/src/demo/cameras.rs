@@ -1,4 +1,4 @@
-//! The part of the demo in which a person is followed through the silhouettes of four cameras.
+//! The part of the demo in which a person is followed through the silhouettes of six cameras.
 
 use std::{fs, path::Path};
 
@@ -19,16 +19,16 @@ use crate::{
 };
 
 /// Folder of the results.
-pub const FOLDER: &str = "walk-4-cameras";
-const CAPTURE: SampleCapture = SampleCapture { cameras: 4, frames: 24, action: Action::Walk, seed: 3 };
+pub const FOLDER: &str = "walk-6-cameras";
+const CAPTURE: SampleCapture = SampleCapture { cameras: 6, frames: 24, action: Action::Walk, seed: 3 };
 
 /// Draws a capture, has it tracked, and says how far the joints are from the true ones.
 pub fn show(client: &Client, folder: &Path, output: &Path) -> anyhow::Result<()> {
-    step("Drawing a walk before four cameras: silhouettes, nothing else");
+    step("Drawing a walk before six cameras: silhouettes, nothing else");
     let capture = folder.join("sample-capture");
     remove(&capture)?;
     CAPTURE.write(&capture, || ())?;
-    let name = "walk seen by 4 cameras";
+    let name = "walk seen by 6 cameras";
     step(&format!("Session {name:?}: finding the body, then its motion"));
     let session = client.create_session(name)?;
     for found in session_files::gather(&[capture.join("calibration.json"), capture.join("silhouettes")])? {
