@@ -148,6 +148,9 @@ fn children(
     let num_cameras = matched.len();
     let goes_on = request.parameters.track && request.inverse_kinematics.is_none();
     let last_weight = if goes_on { INITIALISE_WEIGHT } else { LAST_WEIGHT };
+    let mut parameters = request.parameters.clone();
+    // points of clothes are for those who follow a person
+    parameters.texture &= goes_on;
     let mut jobs = Vec::with_capacity(num_cameras + 1);
     for (index, of) in matched.into_iter().enumerate() {
         let payload = MakeSilhouettes {
@@ -155,7 +158,7 @@ fn children(
             camera: CameraRecord::from(&cameras[of.camera]),
             source: of.pictures,
             plate: of.plate,
-            parameters: request.parameters.clone(),
+            parameters: parameters.clone(),
         };
         let payload = serde_json::to_value(payload).map_err(JobError::retry)?;
         jobs.push(ChildJob::new(MAKE_SILHOUETTES, payload).max_attempts(CAMERA_ATTEMPTS));
