@@ -145,7 +145,7 @@ fn run(folder: &Path, camera: usize, kind: ModelKind) -> Outcome {
 #[test]
 fn the_plates_cover_the_limbs_and_what_they_show_is_warned_of() {
     let test = "the_plates_cover_the_limbs_and_what_they_show_is_warned_of";
-    let Some(folder) = testdata::shared(FOLDER, test) else { return };
+    let Some(folder) = testkit::shared::find(FOLDER, test) else { return };
     // what the README of the data reports of plates that were aligned and gain matched: 81, 42, 80, 74 %
     for (camera, covered, beyond) in [(1, 0.75, 0.03), (2, 0.7, 0.2), (3, 0.8, 0.03), (4, 0.85, 0.03)] {
         let outcome = run(&folder, camera, ModelKind::Plate);
@@ -160,7 +160,7 @@ fn the_plates_cover_the_limbs_and_what_they_show_is_warned_of() {
 #[test]
 fn a_background_learned_from_a_man_who_stays_is_warned_of() {
     let test = "a_background_learned_from_a_man_who_stays_is_warned_of";
-    let Some(folder) = testdata::shared(FOLDER, test) else { return };
+    let Some(folder) = testkit::shared::find(FOLDER, test) else { return };
     for (camera, kind) in (1..=4).map(|camera| (camera, ModelKind::Adaptive)).chain([(3, ModelKind::Mixture)])
     {
         let Outcome { coverage, quality, .. } = run(&folder, camera, kind);

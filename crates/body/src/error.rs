@@ -1,4 +1,4 @@
-/// Why a body model could not be made.
+/// Why a body model could not be made of what was given, or a body not written.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -69,4 +69,55 @@ pub enum Error {
     /// A body's skeleton or motion that can't be.
     #[error(transparent)]
     Motion(#[from] model::Error),
+    /// A file of scans can't be read.
+    #[error("{file}: {source}")]
+    File {
+        /// its name
+        file: String,
+        /// where and what
+        source: formats::Error,
+    },
+    /// A rig, or what belongs to it, is not one.
+    #[error("{file}: {source}")]
+    RigFile {
+        /// name of the file
+        file: String,
+        /// what is wrong with it
+        source: Box<Error>,
+    },
+    /// A file holds something else than it should.
+    #[error("{file}: found {found}, expected {expected}")]
+    Content {
+        /// its name
+        file: String,
+        /// what is in it
+        found: String,
+        /// what should be
+        expected: String,
+    },
+    /// There is nothing to learn from, or too much of it.
+    #[error("found {found}, expected {expected}")]
+    ScanSet {
+        /// what there is
+        found: String,
+        /// what there should be
+        expected: String,
+    },
+    /// A body that GLB can't hold.
+    #[error("no GLB can be made: {0}")]
+    Glb(formats::Error),
+}
+
+impl Error {
+    pub(crate) fn content(file: &str, found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self::Content { file: file.to_owned(), found: found.into(), expected: expected.into() }
+    }
+
+    pub(crate) fn in_file(file: &str) -> impl Fn(formats::Error) -> Self {
+        move |source| Self::File { file: file.to_owned(), source }
+    }
+
+    pub(crate) fn in_rig(file: &str) -> impl Fn(Self) -> Self {
+        move |source| Self::RigFile { file: file.to_owned(), source: Box::new(source) }
+    }
 }

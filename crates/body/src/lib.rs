@@ -11,9 +11,21 @@
 //! ```text
 //! A_j = A_parent · T(h_j) · R_j · T(−h_j),     A_root = T(t) · T(h) · exp(r) · T(−h),     vertex = Σ_k w_k A_k v
 //! ```
+//!
+//! Scans are read by [`ScanSet`], bodies are written by [`glb()`]:
+//!
+//! ```
+//! let model = body::BodyModel::shipped();
+//! let wanted = body::Wanted { stature_m: Some(1.80), mass_kg: Some(75.0), ..Default::default() };
+//! let shape = model.shape(&model.alpha_for(&wanted)?);
+//! let glb = body::glb(&model, &shape, None)?;
+//! assert!(glb.starts_with(b"glTF"));
+//! # Ok::<(), body::Error>(())
+//! ```
 
 mod error;
 mod file;
+mod glb;
 mod heat;
 mod jacobian;
 mod learn;
@@ -27,13 +39,16 @@ mod registered;
 mod regressor;
 mod rig;
 mod rig_json;
+mod scan_files;
 mod shape;
+mod shipped;
 mod skin;
 mod skinned;
 mod template;
 
 pub use error::Error;
 pub use file::MAX_BYTES;
+pub use glb::{Poses, glb};
 pub use heat::heat_skin;
 pub use jacobian::ShapeDrift;
 pub use learn::{Aligned, Alignment, LearnOptions, Learned, Scan, learn, unpose};
@@ -45,7 +60,9 @@ pub use registered::{RegisteredFit, RegisteredOptions, fit_registered};
 pub use regressor::JointRegressor;
 pub use rig::{Dof, DofKind, ROOT_DOFS, Rig, RigJoint};
 pub use rig_json::RigFile;
+pub use scan_files::{ScanOptions, ScanSet, is_scan_file};
 pub use shape::{BodyModel, MAX_COMPONENTS, MAX_VERTICES, ModelParts, Shape};
+pub use shipped::{Shipped, shipped};
 pub use skin::Skin;
 pub use template::{KnownJoints, Template, TemplateParts};
 

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use scans::Scans;
 
 fn folder(test: &str) -> Option<PathBuf> {
-    testdata::shared("data/bodies", test)
+    testkit::shared::find("data/bodies", test)
 }
 
 fn data() -> &'static Scans {

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use body::BodyModel;
-use body_files::shipped;
+use body::{BodyModel, shipped};
 use payloads::{BodyModelFile, SHIPPED};
 use proto::ErrorCode;
 use queue::JobError;

@@ -7,14 +7,15 @@ use motion_db::Clip;
 use sparse::{Method, Parameters};
 
 fn load(folder: &Path) -> Vec<Clip> {
-    let clip = |row: testdata::IndexRow| {
+    let clip = |row: testkit::shared::IndexRow| {
         let (name, subject) = (row.get("trial").to_owned(), row.get("subject").to_owned());
-        let acclaim = formats::asf::read(&testdata::read(folder, &format!("{subject}.asf"))).unwrap().value;
-        let bytes = testdata::read(folder, &format!("{name}.amc"));
+        let acclaim =
+            formats::asf::read(&testkit::shared::read(folder, &format!("{subject}.asf"))).unwrap().value;
+        let bytes = testkit::shared::read(folder, &format!("{name}.amc"));
         let motion = formats::amc::read(&bytes, &acclaim, 120.0).unwrap().value;
         Clip { name, subject, action: row.get("action").to_owned(), motion }
     };
-    testdata::index(folder).into_iter().map(clip).collect()
+    testkit::shared::index(folder).into_iter().map(clip).collect()
 }
 
 struct Means {
@@ -61,7 +62,7 @@ fn evaluate(clips: &[Clip], protocol: Protocol, points: &[usize], methods: &[Met
 #[test]
 fn recorded_trials_are_reconstructed_as_well_as_before() {
     let test = "recorded_trials_are_reconstructed_as_well_as_before";
-    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", test) else { return };
     let clips = load(&folder);
     let (local, nearest) = (Method::LocalRegression, Method::Nearest);
     let results = evaluate(&clips, Protocol::TrialOut, &[4, 6], &[local, nearest]);

@@ -11,9 +11,9 @@ fn main() {
 
 /// A walk of 4.6 s and its skeleton, or nothing.
 fn trial() -> Option<(asf::File, Vec<u8>)> {
-    let folder: PathBuf = testdata::shared("data/motion/five-actions", "parse")?;
-    let acclaim = asf::read(&testdata::read(&folder, "05.asf")).ok()?.value;
-    Some((acclaim, testdata::read(&folder, "05_01.amc")))
+    let folder: PathBuf = testkit::shared::find("data/motion/five-actions", "parse")?;
+    let acclaim = asf::read(&testkit::shared::read(&folder, "05.asf")).ok()?.value;
+    Some((acclaim, testkit::shared::read(&folder, "05_01.amc")))
 }
 
 #[divan::bench]

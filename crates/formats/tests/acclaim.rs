@@ -8,22 +8,22 @@ use model::{Axis, ChannelKind, Motion};
 const FIVE_ACTIONS: &str = "data/motion/five-actions";
 
 fn skeleton(folder: &Path, subject: &str) -> asf::File {
-    let read = asf::read(&testdata::read(folder, &format!("{subject}.asf"))).unwrap();
+    let read = asf::read(&testkit::shared::read(folder, &format!("{subject}.asf"))).unwrap();
     assert_eq!(read.warnings, [], "subject {subject}");
     read.value
 }
 
 /// Every trial of five-actions with its skeleton.
 fn all_trials(test: &str, mut check: impl FnMut(&str, usize, &asf::File, &[u8], &Motion)) {
-    let Some(folder) = testdata::shared(FIVE_ACTIONS, test) else { return };
+    let Some(folder) = testkit::shared::find(FIVE_ACTIONS, test) else { return };
     let mut skeletons = HashMap::new();
-    let rows = testdata::index(&folder);
+    let rows = testkit::shared::index(&folder);
     assert_eq!(rows.len(), 145);
     for row in rows {
         let file = skeletons
             .entry(row.get("subject").to_owned())
             .or_insert_with(|| skeleton(&folder, row.get("subject")));
-        let bytes = testdata::read(&folder, row.get("file"));
+        let bytes = testkit::shared::read(&folder, row.get("file"));
         let read = amc::read(&bytes, file, row.get("fps").parse().unwrap()).unwrap();
         assert_eq!(read.warnings, [], "{}", row.get("trial"));
         check(row.get("trial"), row.get("frames").parse().unwrap(), file, &bytes, &read.value);
@@ -49,9 +49,9 @@ fn all_five_actions_are_read_with_the_frames_of_the_index() {
 #[test]
 fn values_are_those_of_the_text() {
     let test = "values_are_those_of_the_text";
-    let Some(folder) = testdata::shared(FIVE_ACTIONS, test) else { return };
+    let Some(folder) = testkit::shared::find(FIVE_ACTIONS, test) else { return };
     let file = skeleton(&folder, "16");
-    let motion = amc::read(&testdata::read(&folder, "16_15.amc"), &file, 120.0).unwrap().value;
+    let motion = amc::read(&testkit::shared::read(&folder, "16_15.amc"), &file, 120.0).unwrap().value;
     let dof = |name: &str| {
         let dof = file.skeleton.dof_names().iter().position(|n| n == name).unwrap();
         motion.pose(0)[dof]

@@ -239,7 +239,8 @@ fn a_broken_file_among_many_is_named_or_skipped() {
 
 #[test]
 fn the_folder_of_five_actions_is_read_from_a_tar() {
-    let Some(folder) = testdata::shared(FIVE_ACTIONS, "the_folder_of_five_actions_is_read_from_a_tar") else {
+    let Some(folder) = testkit::shared::find(FIVE_ACTIONS, "the_folder_of_five_actions_is_read_from_a_tar")
+    else {
         return;
     };
     let mut names: Vec<_> =
@@ -250,7 +251,7 @@ fn the_folder_of_five_actions_is_read_from_a_tar() {
     let files: Vec<_> = files.iter().map(|(n, b)| (*n, b.as_slice())).collect();
     let read = clips(&entries(&tar(&files)).unwrap()).unwrap();
     assert_eq!(read.warnings, []);
-    let mut index = testdata::index(&folder);
+    let mut index = testkit::shared::index(&folder);
     index.sort_by_key(|row| row.get("file").to_owned());
     assert_eq!(read.value.len(), index.len());
     for (clip, row) in read.value.iter().zip(&index) {

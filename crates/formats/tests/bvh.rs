@@ -222,15 +222,15 @@ fn a_joint_that_translates_in_axes_of_its_own_becomes_two_acclaim_bones() {
 #[test]
 fn all_five_actions_written_as_bvh_move_alike_and_without_jumps() {
     let test = "all_five_actions_written_as_bvh_move_alike_and_without_jumps";
-    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", test) else { return };
     let mut skeletons = HashMap::new();
-    for row in testdata::index(&folder) {
+    for row in testkit::shared::index(&folder) {
         let subject = row.get("subject").to_owned();
-        let file = skeletons
-            .entry(subject.clone())
-            .or_insert_with(|| asf::read(&testdata::read(&folder, &format!("{subject}.asf"))).unwrap().value);
+        let file = skeletons.entry(subject.clone()).or_insert_with(|| {
+            asf::read(&testkit::shared::read(&folder, &format!("{subject}.asf"))).unwrap().value
+        });
         let trial = row.get("trial");
-        let motion = amc::read(&testdata::read(&folder, row.get("file")), file, 120.0).unwrap().value;
+        let motion = amc::read(&testkit::shared::read(&folder, row.get("file")), file, 120.0).unwrap().value;
         let again = read(&bvh::write(&motion));
         assert_eq!(again.frame_rate(), 120.0);
         assert_same_positions(&motion, &again, str::to_owned, trial);

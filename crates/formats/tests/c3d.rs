@@ -14,7 +14,7 @@ fn missing(trajectories: &PointTrajectories) -> usize {
 
 #[test]
 fn recorded_c3d_files_are_read_right() {
-    let Some(folder) = testdata::shared(MARKERS, "recorded_c3d_files_are_read_right") else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, "recorded_c3d_files_are_read_right") else { return };
     let cases = [
         // name, points, frames, rate, first label, missing, warnings
         ("opensim_walking2.c3d", 44, 1249, 250.0, "RTH1", 27_567, 0),
@@ -23,7 +23,7 @@ fn recorded_c3d_files_are_read_right() {
         ("ktk_wheelchair_racing.c3d", 41, 700, 69.99261474609375, "Probe1", 6_384, 1),
     ];
     for (name, points, frames, rate, first, lost, warnings) in cases {
-        let read = c3d::read(&testdata::read(&folder, name), &PointsOptions::default()).unwrap();
+        let read = c3d::read(&testkit::shared::read(&folder, name), &PointsOptions::default()).unwrap();
         assert_eq!(read.warnings.len(), warnings, "{name}: {:?}", read.warnings);
         let trajectories = read.value;
         assert_eq!(trajectories.num_points(), points, "{name}");
@@ -36,7 +36,7 @@ fn recorded_c3d_files_are_read_right() {
 
 #[test]
 fn heads_are_above_feet() {
-    let Some(folder) = testdata::shared(MARKERS, "heads_are_above_feet") else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, "heads_are_above_feet") else { return };
     let cases = [
         ("opensim_walking2.c3d", "LFHD", "LCAL", None),
         ("ezc3d_qualisys.c3d", "L_HDF", "L_FCC", None),
@@ -44,10 +44,12 @@ fn heads_are_above_feet() {
         ("ktk_wheelchair_racing.c3d", "Head1", "WheelchairFront", Some(Axis::Y)),
     ];
     for (name, head, foot, up) in cases {
-        let points =
-            c3d::read(&testdata::read(&folder, name), &PointsOptions { up, ..PointsOptions::default() })
-                .unwrap()
-                .value;
+        let points = c3d::read(
+            &testkit::shared::read(&folder, name),
+            &PointsOptions { up, ..PointsOptions::default() },
+        )
+        .unwrap()
+        .value;
         let mean_height = |label: &str| {
             let point = points.point_index(label).unwrap_or_else(|| panic!("{name}: {:?}", points.names()));
             let heights: Vec<f64> =
@@ -63,11 +65,14 @@ fn heads_are_above_feet() {
 /// z up, with five digits.
 #[test]
 fn a_trial_is_the_same_from_c3d_and_from_trc() {
-    let Some(folder) = testdata::shared(MARKERS, "a_trial_is_the_same_from_c3d_and_from_trc") else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, "a_trial_is_the_same_from_c3d_and_from_trc") else {
+        return;
+    };
     let options = PointsOptions { up: Some(Axis::Z), ..PointsOptions::default() };
     let binary =
-        c3d::read(&testdata::read(&folder, "opensim_walking2.c3d"), &PointsOptions::default()).unwrap();
-    let text = trc::read(&testdata::read(&folder, "opensim_walking2_markers.trc"), &options).unwrap();
+        c3d::read(&testkit::shared::read(&folder, "opensim_walking2.c3d"), &PointsOptions::default())
+            .unwrap();
+    let text = trc::read(&testkit::shared::read(&folder, "opensim_walking2_markers.trc"), &options).unwrap();
     let messages: Vec<_> = text.warnings.iter().map(ToString::to_string).collect();
     assert_eq!(
         messages,

@@ -34,19 +34,19 @@ fn first_lines(bytes: &[u8], lines: usize) -> Vec<u8> {
 
 /// Pieces of recorded files of every format, or nothing where there are none.
 fn seeds(test: &str) -> Option<Vec<Seed>> {
-    let motion = testdata::shared("data/motion/five-actions", test)?;
-    let markers = testdata::shared("data/markers", test)?;
-    let skeleton = testdata::read(&motion, "16.asf");
+    let motion = testkit::shared::find("data/motion/five-actions", test)?;
+    let markers = testkit::shared::find("data/markers", test)?;
+    let skeleton = testkit::shared::read(&motion, "16.asf");
     let acclaim = asf::read(&skeleton).unwrap().value;
     // three lines of header and 30 a frame
-    let frames = first_lines(&testdata::read(&motion, "16_15.amc"), 3 + 3 * 30);
+    let frames = first_lines(&testkit::shared::read(&motion, "16_15.amc"), 3 + 3 * 30);
     let three = amc::read(&frames, &acclaim, 120.0).unwrap().value;
     let written = bvh::write(&three).into_bytes();
-    let rows = first_lines(&testdata::read(&markers, "opensim_walk_free_01.trc"), 10);
+    let rows = first_lines(&testkit::shared::read(&markers, "opensim_walk_free_01.trc"), 10);
     let points = trc::read(&rows, &PointsOptions::default()).unwrap().value;
     let trust = "frame,time,a_x,a_y,a_z,a_sigma,a_confidence\n0,0,1,2,3,0.01,0.5\n1,0.1,1,2,3,,1e-3\n";
     // cut behind two frames of 44 points and 96 analog values, and the header says so
-    let mut binary = testdata::read(&markers, "opensim_walking2.c3d");
+    let mut binary = testkit::shared::read(&markers, "opensim_walking2.c3d");
     binary.truncate(13 * 512 + 2 * 4 * (4 * 44 + 96));
     binary[8] = 2;
     binary[9] = 0;

@@ -71,8 +71,10 @@ fn jpegs_are_read_nearly_as_they_were() {
 #[test]
 fn the_one_bit_masks_of_the_synthetic_capture_are_read() {
     let test = "the_one_bit_masks_of_the_synthetic_capture_are_read";
-    let Some(folder) = testdata::shared("data/multiview/synthetic-8cam/silhouettes", test) else { return };
-    let bytes = testdata::read(&folder, "cam0/0000.png");
+    let Some(folder) = testkit::shared::find("data/multiview/synthetic-8cam/silhouettes", test) else {
+        return;
+    };
+    let bytes = testkit::shared::read(&folder, "cam0/0000.png");
     let read = image_files::read_silhouette(&bytes, &Limits::default()).unwrap();
     assert_eq!((read.value.width(), read.value.height(), read.warnings.len()), (1004, 1004, 0));
     assert!((20_000..200_000).contains(&read.value.area()), "{}", read.value.area());

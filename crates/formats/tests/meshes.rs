@@ -33,18 +33,18 @@ fn what_is_written_is_read_again() {
 #[test]
 fn scans_in_obj_and_npy_have_the_same_topology() {
     let test = "scans_in_obj_and_npy_have_the_same_topology";
-    let Some(folder) = testdata::shared("data/bodies/scans", test) else { return };
-    let template = obj::read(&testdata::read(&folder, "topology.obj")).unwrap();
+    let Some(folder) = testkit::shared::find("data/bodies/scans", test) else { return };
+    let template = obj::read(&testkit::shared::read(&folder, "topology.obj")).unwrap();
     assert!(template.warnings.is_empty());
     let template = template.value;
     assert_eq!((template.vertices.len(), template.faces.len()), (6500, 12_996));
     assert!((0.03..0.15).contains(&template.volume()), "outside is outside");
-    let faces = npy::read(&testdata::read(&folder, "faces.npy")).unwrap();
+    let faces = npy::read(&testkit::shared::read(&folder, "faces.npy")).unwrap();
     assert_eq!(faces.shape, [12_996, 3]);
     assert!(faces.values.iter().zip(template.faces.as_flattened()).all(|(a, b)| *a == f64::from(*b)));
-    let joints = npy::read(&testdata::read(&folder, "joints.npy")).unwrap();
+    let joints = npy::read(&testkit::shared::read(&folder, "joints.npy")).unwrap();
     assert_eq!(joints.shape, [564, 21, 3]);
-    let vertices = npy::read(&testdata::read(&folder, "vertices.npy")).unwrap();
+    let vertices = npy::read(&testkit::shared::read(&folder, "vertices.npy")).unwrap();
     assert_eq!(vertices.shape, [564, 6500, 3]);
     // the template is the mean of the first 114, in steps of 0.1 mm
     let mean = |number: usize| {
@@ -58,8 +58,10 @@ fn scans_in_obj_and_npy_have_the_same_topology() {
 #[test]
 fn the_mesh_of_the_synthetic_capture_stands_on_the_floor() {
     let test = "the_mesh_of_the_synthetic_capture_stands_on_the_floor";
-    let Some(folder) = testdata::shared("data/multiview/synthetic-8cam/groundtruth", test) else { return };
-    let read = ply::read(&testdata::read(&folder, "mesh_0000.ply")).unwrap();
+    let Some(folder) = testkit::shared::find("data/multiview/synthetic-8cam/groundtruth", test) else {
+        return;
+    };
+    let read = ply::read(&testkit::shared::read(&folder, "mesh_0000.ply")).unwrap();
     assert_eq!((read.value.vertices.len(), read.value.faces.len()), (6500, 12_996));
     let floor = read.value.vertices.iter().map(|vertex| vertex.y).fold(f64::INFINITY, f64::min);
     assert!(floor.abs() < 2e-3 && read.warnings.is_empty(), "{floor}");

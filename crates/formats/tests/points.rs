@@ -9,7 +9,8 @@ const MARKERS: &str = "data/markers";
 
 fn read_trc(folder: &Path, name: &str, up: Option<Axis>) -> (PointTrajectories, Vec<String>) {
     let read =
-        trc::read(&testdata::read(folder, name), &PointsOptions { up, ..PointsOptions::default() }).unwrap();
+        trc::read(&testkit::shared::read(folder, name), &PointsOptions { up, ..PointsOptions::default() })
+            .unwrap();
     (read.value, read.warnings.iter().map(ToString::to_string).collect())
 }
 
@@ -21,7 +22,7 @@ fn missing(trajectories: &PointTrajectories) -> usize {
 
 #[test]
 fn recorded_trc_files_are_read_right() {
-    let Some(folder) = testdata::shared(MARKERS, "recorded_trc_files_are_read_right") else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, "recorded_trc_files_are_read_right") else { return };
     let cases = [
         ("opensim_subject01_static.trc", 49, 300, 60.0, "R.ASIS"),
         ("opensim_walk_free_01.trc", 41, 73, 60.0, "R.ASIS"),
@@ -45,7 +46,7 @@ fn recorded_trc_files_are_read_right() {
 #[test]
 fn a_header_that_declares_900_frames_over_73_rows_is_a_warning() {
     let test = "a_header_that_declares_900_frames_over_73_rows_is_a_warning";
-    let Some(folder) = testdata::shared(MARKERS, test) else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, test) else { return };
     let (trajectories, warnings) = read_trc(&folder, "opensim_walk_free_01.trc", None);
     assert_eq!(trajectories.num_frames(), 73);
     assert_eq!(warnings, ["line 3: the file declares 900 frames and has 73; all 73 are read"]);
@@ -53,11 +54,11 @@ fn a_header_that_declares_900_frames_over_73_rows_is_a_warning() {
 
 #[test]
 fn blank_cells_are_missing_samples() {
-    let Some(folder) = testdata::shared(MARKERS, "blank_cells_are_missing_samples") else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, "blank_cells_are_missing_samples") else { return };
     let (trajectories, warnings) = read_trc(&folder, "opensim_blanks_for_missing.trc", None);
     assert_eq!(warnings, Vec::<String>::new());
     // counted apart from the reader: triples of empty cells in the rows
-    let bytes = testdata::read(&folder, "opensim_blanks_for_missing.trc");
+    let bytes = testkit::shared::read(&folder, "opensim_blanks_for_missing.trc");
     let text = String::from_utf8(bytes).unwrap();
     let rows: Vec<Vec<&str>> =
         text.lines().skip(6).map(|l| l.trim_end_matches(' ').split('\t').skip(2).collect()).collect();
@@ -73,7 +74,7 @@ fn blank_cells_are_missing_samples() {
 #[test]
 fn points_from_trc_survive_writing_and_reading_as_csv() {
     let test = "points_from_trc_survive_writing_and_reading_as_csv";
-    let Some(folder) = testdata::shared(MARKERS, test) else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, test) else { return };
     for name in ["opensim_subject01_static.trc", "opensim_walk_free_01.trc", "opensim_blanks_for_missing.trc"]
     {
         let (before, _) = read_trc(&folder, name, None);

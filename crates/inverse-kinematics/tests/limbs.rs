@@ -9,8 +9,11 @@ use vision::scene::SilhouetteNoise;
 
 fn recorded(folder: &Path, trial: &str) -> Motion {
     let (subject, _) = trial.split_once('_').unwrap();
-    let acclaim = formats::asf::read(&testdata::read(folder, &format!("{subject}.asf"))).unwrap().value;
-    formats::amc::read(&testdata::read(folder, &format!("{trial}.amc")), &acclaim, 120.0).unwrap().value
+    let acclaim =
+        formats::asf::read(&testkit::shared::read(folder, &format!("{subject}.asf"))).unwrap().value;
+    formats::amc::read(&testkit::shared::read(folder, &format!("{trial}.amc")), &acclaim, 120.0)
+        .unwrap()
+        .value
 }
 
 fn noisy(mut seen: Silhouette, frame: usize, camera: usize) -> Silhouette {
@@ -53,7 +56,8 @@ fn evaluate(folder: &Path, limbs: Limbs, trials: &[&str], frames: usize) -> [Vec
 
 #[test]
 fn images_find_elbows_of_a_boxer() {
-    let Some(folder) = testdata::shared("data/motion/five-actions", "images_find_elbows_of_a_boxer") else {
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", "images_find_elbows_of_a_boxer")
+    else {
         return;
     };
     // tuned on 13_17
@@ -64,7 +68,8 @@ fn images_find_elbows_of_a_boxer() {
 
 #[test]
 fn images_find_knees_of_walkers() {
-    let Some(folder) = testdata::shared("data/motion/five-actions", "images_find_knees_of_walkers") else {
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", "images_find_knees_of_walkers")
+    else {
         return;
     };
     // tuned on 07_01

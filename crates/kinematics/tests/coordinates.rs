@@ -172,7 +172,7 @@ fn every_pose_of_drawn_motion_comes_back() {
 #[test]
 fn every_pose_of_recorded_motion_comes_back() {
     let test = "every_pose_of_recorded_motion_comes_back";
-    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", test) else { return };
     for trial in ["16_15", "35_17", "35_01", "64_01", "91_29"] {
         if !folder.join(format!("{trial}.amc.zst")).exists() {
             continue;

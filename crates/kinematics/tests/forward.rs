@@ -146,14 +146,14 @@ fn drawn_motion_stands_where_the_acclaim_formula_puts_it() {
 #[test]
 fn recorded_motion_stands_where_the_acclaim_formula_puts_it() {
     let test = "recorded_motion_stands_where_the_acclaim_formula_puts_it";
-    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", test) else { return };
     for (subject, trial) in
         [("05", "05_01"), ("16", "16_15"), ("13", "13_17"), ("09", "09_01"), ("91", "91_29")]
     {
         if !folder.join(format!("{trial}.amc.zst")).exists() {
             continue;
         }
-        let text = |name: String| String::from_utf8(testdata::read(&folder, &name)).unwrap();
+        let text = |name: String| String::from_utf8(testkit::shared::read(&folder, &name)).unwrap();
         let (asf, amc) = (text(format!("{subject}.asf")), text(format!("{trial}.amc")));
         check_against_text(&recorded(&folder, trial), &asf, &amc, 1e-9);
     }

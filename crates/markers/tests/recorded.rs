@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 const MARKERS: &str = "data/markers";
 
 fn read(folder: &Path, name: &str) -> PointTrajectories {
-    let bytes = testdata::read(folder, name);
+    let bytes = testkit::shared::read(folder, name);
     // of the TRC files this one alone has z up, and does not say so
     let up = (name == "opensim_walking2_markers.trc").then_some(Axis::Z);
     let options = PointsOptions { up, ..PointsOptions::default() };
@@ -28,7 +28,9 @@ fn mapped(folder: &Path, name: &str) -> (PointTrajectories, Mapped) {
 
 #[test]
 fn every_recorded_file_is_known_or_refused() {
-    let Some(folder) = testdata::shared(MARKERS, "every_recorded_file_is_known_or_refused") else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, "every_recorded_file_is_known_or_refused") else {
+        return;
+    };
     for (name, expected) in [
         ("opensim_walking2.c3d", "fullbody-2009, 4 points"),
         ("opensim_walking2_markers.trc", "fullbody-2009, 4 points"),
@@ -88,7 +90,7 @@ fn sidedness(file: &PointTrajectories, mapped: &Mapped, pelvis: [&str; 3], pair:
 
 #[test]
 fn points_are_where_a_person_has_them() {
-    let Some(folder) = testdata::shared(MARKERS, "points_are_where_a_person_has_them") else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, "points_are_where_a_person_has_them") else { return };
     let cases = [
         ("opensim_walking2.c3d", ["LASI", "RASI", "RPSI"], false),
         ("opensim_walking2_markers.trc", ["LASI", "RASI", "RPSI"], false),
@@ -122,10 +124,10 @@ fn points_are_where_a_person_has_them() {
 
 #[test]
 fn a_person_who_lies_in_every_frame_is_a_warning() {
-    let Some(folder) = testdata::shared(MARKERS, "a_person_who_lies_in_every_frame_is_a_warning") else {
+    let Some(folder) = testkit::shared::find(MARKERS, "a_person_who_lies_in_every_frame_is_a_warning") else {
         return;
     };
-    let bytes = testdata::read(&folder, "opensim_walking2_markers.trc");
+    let bytes = testkit::shared::read(&folder, "opensim_walking2_markers.trc");
     let lying = trc::read(&bytes, &PointsOptions::default()).unwrap().value;
     let mapped = detect(lying.names()).unwrap().with_prefix().apply(&lying, &[]).unwrap();
     assert!(mapped.warnings.iter().any(|w| w.contains("is not above the ankles")), "{:?}", mapped.warnings);
@@ -136,7 +138,9 @@ const FASTEST: f64 = 25.0;
 
 #[test]
 fn points_do_not_jump_where_markers_drop_out() {
-    let Some(folder) = testdata::shared(MARKERS, "points_do_not_jump_where_markers_drop_out") else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, "points_do_not_jump_where_markers_drop_out") else {
+        return;
+    };
     for name in ["opensim_walking2.c3d", "opensim_blanks_for_missing.trc", "ktk_tennis_serve.c3d"] {
         let (_, mapped) = mapped(&folder, name);
         let t = &mapped.trajectories;
@@ -155,7 +159,9 @@ fn points_do_not_jump_where_markers_drop_out() {
 /// In the static trial both kinds of ankle are there: what the walk has must lead to the same place.
 #[test]
 fn the_ankle_from_foot_markers_is_the_ankle() {
-    let Some(folder) = testdata::shared(MARKERS, "the_ankle_from_foot_markers_is_the_ankle") else { return };
+    let Some(folder) = testkit::shared::find(MARKERS, "the_ankle_from_foot_markers_is_the_ankle") else {
+        return;
+    };
     let file = read(&folder, "opensim_subject01_static.trc");
     let gait = markers::preset("gait2392").unwrap();
     for side in ["left_ankle", "right_ankle"] {

@@ -32,11 +32,11 @@ fn session(file: &model::PointTrajectories, like: &Motion, has_offsets: bool) ->
 
 #[test]
 fn a_recorded_walk_is_followed_and_offsets_help() {
-    let Some(folder) = testdata::shared("data/markers", "a_recorded_walk_is_followed_and_offsets_help")
+    let Some(folder) = testkit::shared::find("data/markers", "a_recorded_walk_is_followed_and_offsets_help")
     else {
         return;
     };
-    let bytes = testdata::read(&folder, "opensim_walk_free_01.trc");
+    let bytes = testkit::shared::read(&folder, "opensim_walk_free_01.trc");
     let file = trc::read(&bytes, &PointsOptions::default()).unwrap().value;
     let clips = walks();
     let database = MotionDatabase::build(&clips).unwrap();

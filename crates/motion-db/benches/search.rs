@@ -12,15 +12,16 @@ fn main() {
 }
 
 fn recorded() -> Option<Vec<Clip>> {
-    let folder = testdata::shared("data/motion/five-actions", "search")?;
-    let clip = |row: testdata::IndexRow| {
+    let folder = testkit::shared::find("data/motion/five-actions", "search")?;
+    let clip = |row: testkit::shared::IndexRow| {
         let (name, subject) = (row.get("trial").to_owned(), row.get("subject").to_owned());
-        let acclaim = formats::asf::read(&testdata::read(&folder, &format!("{subject}.asf"))).ok()?.value;
-        let bytes = testdata::read(&folder, &format!("{name}.amc"));
+        let acclaim =
+            formats::asf::read(&testkit::shared::read(&folder, &format!("{subject}.asf"))).ok()?.value;
+        let bytes = testkit::shared::read(&folder, &format!("{name}.amc"));
         let motion = formats::amc::read(&bytes, &acclaim, 120.0).ok()?.value;
         Some(Clip { name, subject, action: row.get("action").to_owned(), motion })
     };
-    testdata::index(&folder).into_iter().map(clip).collect()
+    testkit::shared::index(&folder).into_iter().map(clip).collect()
 }
 
 fn drawn(seed: u64) -> Option<Clip> {

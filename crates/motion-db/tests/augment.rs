@@ -76,7 +76,8 @@ fn a_performer_whose_sides_differ_is_mirrored_too() {
 
 #[test]
 fn recorded_poses_are_mirrored_exactly() {
-    let Some(folder) = testdata::shared("data/motion/five-actions", "recorded_poses_are_mirrored_exactly")
+    let Some(folder) =
+        testkit::shared::find("data/motion/five-actions", "recorded_poses_are_mirrored_exactly")
     else {
         return;
     };

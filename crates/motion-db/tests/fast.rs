@@ -30,7 +30,7 @@ fn hits(found: &[Neighbour], expected: &[Neighbour]) -> usize {
 
 /// Recordings of the five actions, those of every fourth performer apart.
 fn held_out(test: &str) -> Option<(Vec<Clip>, Vec<Clip>)> {
-    let folder = testdata::shared("data/motion/five-actions", test)?;
+    let folder = testkit::shared::find("data/motion/five-actions", test)?;
     let clips = recorded(&folder, 2);
     let mut performers: Vec<String> = clips.iter().map(|c| c.subject.clone()).collect();
     performers.sort();

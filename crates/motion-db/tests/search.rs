@@ -128,7 +128,7 @@ fn equal_windows_come_in_the_order_of_their_rows() {
 #[test]
 fn recorded_windows_are_found_as_by_brute_force() {
     let test = "recorded_windows_are_found_as_by_brute_force";
-    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", test) else { return };
     let mut clips: Vec<Clip> = recorded(&folder, 6);
     let asked = clips.swap_remove(3);
     let database = MotionDatabase::build(&clips).unwrap();

@@ -13,8 +13,11 @@ const TRIALS: [&str; 6] = ["13_17", "07_01", "16_35", "64_01", "49_02", "91_02"]
 
 fn recorded(folder: &Path, trial: &str) -> Motion {
     let (subject, _) = trial.split_once('_').unwrap();
-    let acclaim = formats::asf::read(&testdata::read(folder, &format!("{subject}.asf"))).unwrap().value;
-    formats::amc::read(&testdata::read(folder, &format!("{trial}.amc")), &acclaim, 120.0).unwrap().value
+    let acclaim =
+        formats::asf::read(&testkit::shared::read(folder, &format!("{subject}.asf"))).unwrap().value;
+    formats::amc::read(&testkit::shared::read(folder, &format!("{trial}.amc")), &acclaim, 120.0)
+        .unwrap()
+        .value
 }
 
 /// Bones of the recording and of the body: upper and lower arms and legs.
@@ -61,7 +64,7 @@ fn of_body(model: &BodyModel, pose: &[f64]) -> Vec<Vector3<f64>> {
 #[test]
 fn the_bodys_bones_point_as_the_recorded_ones_do() {
     let Some(folder) =
-        testdata::shared("data/motion/five-actions", "the_bodys_bones_point_as_the_recorded_ones_do")
+        testkit::shared::find("data/motion/five-actions", "the_bodys_bones_point_as_the_recorded_ones_do")
     else {
         return;
     };
@@ -94,7 +97,7 @@ fn the_bodys_bones_point_as_the_recorded_ones_do() {
 
 #[test]
 fn a_hundred_training_poses_are_near_to_all_that_people_did() {
-    let Some(folder) = testdata::shared(
+    let Some(folder) = testkit::shared::find(
         "data/motion/five-actions",
         "a_hundred_training_poses_are_near_to_all_that_people_did",
     ) else {

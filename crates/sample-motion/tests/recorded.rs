@@ -9,12 +9,13 @@ use model::Motion;
 use sample_motion::{Action, DrawOptions, LabelledMotion, Model};
 
 fn recorded(folder: &Path, wanted: impl Fn(&str) -> bool) -> Vec<LabelledMotion> {
-    let rows = testdata::index(folder).into_iter().filter(|row| wanted(row.get("action")));
+    let rows = testkit::shared::index(folder).into_iter().filter(|row| wanted(row.get("action")));
     rows.map(|row| {
         let (name, subject) = (row.get("trial").to_owned(), row.get("subject").to_owned());
-        let skeleton = asf::read(&testdata::read(folder, &format!("{subject}.asf"))).unwrap().value;
-        let motion =
-            amc::read(&testdata::read(folder, &format!("{name}.amc")), &skeleton, 120.0).unwrap().value;
+        let skeleton = asf::read(&testkit::shared::read(folder, &format!("{subject}.asf"))).unwrap().value;
+        let motion = amc::read(&testkit::shared::read(folder, &format!("{name}.amc")), &skeleton, 120.0)
+            .unwrap()
+            .value;
         LabelledMotion { name, subject, action: row.get("action").parse().unwrap(), motion }
     })
     .collect()
@@ -57,7 +58,7 @@ fn nearest(from: &[Vec<f64>], others: &[&Vec<Vec<f64>>]) -> f64 {
 #[test]
 fn drawn_trials_are_as_far_from_recorded_ones_as_those_from_each_other() {
     let test = "drawn_trials_are_as_far_from_recorded_ones_as_those_from_each_other";
-    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", test) else { return };
     for action in Action::ALL {
         let trials = recorded(&folder, |a| a == action.name());
         let mut postures_of: Vec<(&str, Vec<Vec<f64>>)> = Vec::new();
@@ -118,7 +119,7 @@ fn drawn_trials_are_as_far_from_recorded_ones_as_those_from_each_other() {
 #[test]
 fn learning_from_the_recorded_trials_gives_the_bundled_model() {
     let test = "learning_from_the_recorded_trials_gives_the_bundled_model";
-    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", test) else { return };
     let mut motions = recorded(&folder, |action| action.parse::<Action>().is_ok());
     motions.sort_by(|a, b| a.name.cmp(&b.name));
     let learned = Model::learn(&motions).unwrap();
@@ -135,7 +136,7 @@ fn learning_from_the_recorded_trials_gives_the_bundled_model() {
 #[test]
 fn a_model_needs_enough_motion() {
     let test = "a_model_needs_enough_motion";
-    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", test) else { return };
     let boxing = recorded(&folder, |action| action == "boxing");
     let mut short = boxing[0].clone();
     let skeleton = short.motion.skeleton().clone();

@@ -30,7 +30,7 @@ fn seen(mesh: &Mesh, cameras: &[Camera]) -> Vec<(Camera, Silhouette)> {
 #[test]
 fn a_person_the_model_was_learned_without_is_found_in_several_poses() {
     let test = "a_person_the_model_was_learned_without_is_found_in_several_poses";
-    let Some(bodies) = testdata::shared("data/bodies", test) else { return };
+    let Some(bodies) = testkit::shared::find("data/bodies", test) else { return };
     let data = scans::Scans::read(&bodies);
     let options = LearnOptions::default();
     let aligned = Aligned::new(&data.base(), &data.template, &options).unwrap();
@@ -76,7 +76,7 @@ fn capture(folder: &Path, wanted: &[usize], noise: Option<u64>) -> (Vec<(Camera,
 
 /// Limits: surface mean absolute and standard deviation, joints, mm.
 fn judge(test: &str, wanted: &[usize], noise: Option<u64>, limits: [f64; 3]) {
-    let Some(folder) = testdata::shared("data/multiview/synthetic-8cam", test) else { return };
+    let Some(folder) = testkit::shared::find("data/multiview/synthetic-8cam", test) else { return };
     let (views, mesh) = capture(&folder, wanted, noise);
     let text = fs::read_to_string(folder.join("groundtruth/joints.json")).unwrap();
     let model = BodyModel::shipped();

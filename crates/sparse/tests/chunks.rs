@@ -69,7 +69,7 @@ fn a_long_drawn_walk_is_the_same_cut_and_uncut() {
 #[test]
 fn a_recorded_boxing_match_is_the_same_cut_and_uncut() {
     let test = "a_recorded_boxing_match_is_the_same_cut_and_uncut";
-    let Some(folder) = testdata::shared("data/motion/five-actions", test) else { return };
+    let Some(folder) = testkit::shared::find("data/motion/five-actions", test) else { return };
     let (boxer, others) = five_actions(&folder, "13_17", |_, action| action == "boxing" || action == "jump");
     let recorded = Recorded::new(&others);
     let truth = at_60(&boxer.motion);

@@ -19,7 +19,7 @@ const FRAMES: usize = 40;
 
 fn views(folder: &Path, cameras: &[Camera], frame: usize, noise: Option<u64>) -> Vec<(Camera, Silhouette)> {
     let read = |(index, camera): (usize, &Camera)| {
-        let file = testdata::read(folder, &format!("silhouettes/{}/{frame:04}.png", camera.name));
+        let file = testkit::shared::read(folder, &format!("silhouettes/{}/{frame:04}.png", camera.name));
         let mut silhouette = image_files::read_silhouette(&file, &Default::default()).unwrap().value;
         if let Some(seed) = noise {
             SilhouetteNoise::default().add_to(&mut silhouette, seed + frame as u64, index as u64);
@@ -31,7 +31,8 @@ fn views(folder: &Path, cameras: &[Camera], frame: usize, noise: Option<u64>) ->
 
 /// True joints of every frame, in the order of the model's rig.
 fn truth(folder: &Path, model: &BodyModel) -> Vec<Vec<Vector3<f64>>> {
-    let json: Value = serde_json::from_slice(&testdata::read(folder, "groundtruth/joints.json")).unwrap();
+    let json: Value =
+        serde_json::from_slice(&testkit::shared::read(folder, "groundtruth/joints.json")).unwrap();
     let names: Vec<&str> =
         json["joint_names"].as_array().unwrap().iter().map(|n| n.as_str().unwrap()).collect();
     let frames = json["frames"].as_array().unwrap();
@@ -56,7 +57,7 @@ fn matches(folder: &Path, camera: &Camera, frames: &[Vec<(Camera, Silhouette)>])
             views.iter().find(|(of, _)| of.name == camera.name).map(|(_, silhouette)| silhouette);
         let name = format!("images/{}/{frame:04}.jpg", camera.name);
         let Some(silhouette) = silhouette.filter(|_| folder.join(&name).exists()) else { return Vec::new() };
-        let bytes = testdata::read(folder, &name);
+        let bytes = testkit::shared::read(folder, &name);
         let image = image_files::read_image(&bytes, &Default::default()).unwrap();
         let now = detect(&image, silhouette, &options);
         let pairs = match_features(&before, &now, &options).into_iter().map(|[i, j]| PointMatch {
@@ -84,8 +85,8 @@ struct Case {
 
 fn judge(test: &str, case: &Case) {
     let Case { cameras: wanted, noise, has_pictures, limits } = *case;
-    let Some(folder) = testdata::shared("data/multiview/synthetic-8cam", test) else { return };
-    let file = testdata::read(&folder, "calibration.json");
+    let Some(folder) = testkit::shared::find("data/multiview/synthetic-8cam", test) else { return };
+    let file = testkit::shared::read(&folder, "calibration.json");
     let all = calibration::read("calibration.json", &file, &Default::default()).unwrap().value;
     let cameras: Vec<Camera> = wanted.iter().map(|&index| all[index].clone()).collect();
     let model = BodyModel::shipped();

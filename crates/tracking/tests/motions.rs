@@ -20,7 +20,7 @@ static GO: AtomicBool = AtomicBool::new(false);
 /// Follows a registered scan, whose surface is not one of the model's, through a mixed motion, from a start that `shape_fit`
 /// finds. Limits: mean joint error, largest, metres; least intersection over union.
 fn judge(test: &str, subjects: &[usize], views: usize, noise: Option<u64>, limits: [f64; 3]) {
-    let Some(bodies) = testdata::shared("data/bodies", test) else { return };
+    let Some(bodies) = testkit::shared::find("data/bodies", test) else { return };
     let data = scans::Scans::read(&bodies);
     let model = BodyModel::shipped();
     let cameras = cameras(views);

@@ -146,7 +146,7 @@ fn forearms_that_swing_before_the_belly_are_seen_in_the_texture_alone() {
 #[test]
 fn texture_follows_a_scanned_person_no_worse_than_silhouettes() {
     let test = "texture_follows_a_scanned_person_no_worse_than_silhouettes";
-    let Some(bodies) = testdata::shared("data/bodies", test) else { return };
+    let Some(bodies) = testkit::shared::find("data/bodies", test) else { return };
     let data = scans::Scans::read(&bodies);
     let model = BodyModel::shipped();
     let subject = 60;

@@ -260,7 +260,7 @@ fn a_file_that_was_not_finished_is_removed() {
 #[test]
 fn the_recorded_videos_are_read_whole() {
     let test = "the_recorded_videos_are_read_whole";
-    let Some(folder) = testdata::shared("data/multiview/pose2sim-demo/videos", test) else { return };
+    let Some(folder) = testkit::shared::find("data/multiview/pose2sim-demo/videos", test) else { return };
     for (number, width) in [(1, 1080), (2, 1080), (3, 1088), (4, 1088)] {
         let source = Source::Video(folder.join(format!("cam0{number}.mp4")));
         let small = ReadOptions { size: Some([width / 4, 480]), ..ReadOptions::default() };

@@ -7,7 +7,7 @@ use std::{
 
 use ::body::{BodyModel, LearnOptions, Sex, Wanted};
 use anyhow::{Context, bail};
-use body_files::{ScanOptions, ScanSet, shipped};
+use body::{ScanOptions, ScanSet, shipped};
 use formats::archive::{self, Entry, Limits};
 use serde_json::{Value, json};
 
@@ -217,11 +217,11 @@ fn entries(paths: &[PathBuf]) -> anyhow::Result<Vec<Entry>> {
     let mut entries = Vec::new();
     for (path, name) in files {
         let name = name.to_string_lossy().into_owned();
-        if !body_files::is_used(&name) && !pack::is_archive(&name) {
+        if !body::is_scan_file(&name) && !pack::is_archive(&name) {
             continue;
         }
         let bytes = fs::read(&path).with_context(|| path.display().to_string())?;
-        let found = archive::entries_where(&name, &bytes, &Limits::default(), body_files::is_used);
+        let found = archive::entries_where(&name, &bytes, &Limits::default(), body::is_scan_file);
         entries.extend(found.with_context(|| path.display().to_string())?);
     }
     Ok(entries)
@@ -245,7 +245,7 @@ fn learn_here(args: &LearnArgs, out: &Path) -> anyhow::Result<()> {
 
 fn learn_there(args: &LearnArgs) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
-    let uploads = pack::pack_where(&args.name, &args.files, &|name| body_files::is_used(name))?;
+    let uploads = pack::pack_where(&args.name, &args.files, &|name| body::is_scan_file(name))?;
     let model: Value = client.post("/v1/body-models", &json!({ "name": args.name }))?;
     let id = model["id"].as_str().context("the answer has no id")?;
     for upload in uploads {
@@ -281,7 +281,7 @@ fn sample(args: &SampleArgs) -> anyhow::Result<()> {
     let shape = model.shape(&alpha);
     let name = args.out.to_string_lossy().to_ascii_lowercase();
     let bytes = match name.rsplit('.').next() {
-        Some("glb") => body_files::glb(&model, &shape, None)?,
+        Some("glb") => body::glb(&model, &shape, None)?,
         Some("ply") => formats::ply::write(&shape.mesh(&model)),
         Some("obj") => formats::obj::write(&shape.mesh(&model)).into_bytes(),
         _ => bail!("{}: expected a name that ends in .glb, .ply or .obj", args.out.display()),

@@ -24,9 +24,6 @@ pub enum InputError {
     /// A body that can't be written.
     #[error(transparent)]
     Body(#[from] body::Error),
-    /// A body that can't be written as GLB.
-    #[error(transparent)]
-    BodyFile(#[from] body_files::Error),
     /// Joints that can't be written.
     #[error(transparent)]
     Joints(#[from] model::Error),

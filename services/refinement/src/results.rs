@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use body::{BodyModel, Shape};
-use body_files::Poses;
+use body::{BodyModel, Poses, Shape};
 use model::{Motion, PointTrajectories};
 use nalgebra::Vector3;
 use tracking::{Chunk, Stage};
@@ -71,7 +70,7 @@ pub(crate) const EXPORTS: [Export; 7] = [
         write: |of| {
             let poses = of.poses();
             let poses = Poses { poses: &poses, frame_rate: of.frame_rate };
-            Ok(body_files::glb(&of.model, &of.shape, Some(poses))?)
+            Ok(body::glb(&of.model, &of.shape, Some(poses))?)
         },
     },
     Export {

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use body::{LearnOptions, Learned};
-use body_files::{ScanOptions, ScanSet};
+use body::{LearnOptions, Learned, ScanOptions, ScanSet};
 use formats::archive::{self, Entry, Limits};
 use payloads::{BUILD_BODY_MODEL, BodyModelName, BuildBodyModel, InputFile};
 use queue::{Handler, JobContext, JobError, Outcome};
@@ -75,7 +74,7 @@ impl Handler for BuildHandler {
         };
         let (set, learned) = compute::run(move || {
             let learned = set.learn(&learning)?;
-            Ok::<_, body_files::Error>((set, learned))
+            Ok::<_, body::Error>((set, learned))
         })
         .await
         .map_err(InputError::from)?;
@@ -115,8 +114,8 @@ impl BuildHandler {
             let (name, total_bytes) = (file.name.clone(), left);
             let unpacked = compute::run(move || -> Result<Vec<Entry>, InputError> {
                 let limits = Limits { total_bytes, ..Limits::default() };
-                let is_single = body_files::is_used(&name);
-                let mut entries = archive::entries_where(&name, &bytes, &limits, body_files::is_used)
+                let is_single = body::is_scan_file(&name);
+                let mut entries = archive::entries_where(&name, &bytes, &limits, body::is_scan_file)
                     .map_err(FileError::in_file(&name))?;
                 if !is_single {
                     entries.iter_mut().for_each(|entry| entry.name.insert_str(0, &format!("{name}/")));

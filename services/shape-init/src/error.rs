@@ -29,13 +29,10 @@ pub enum InputError {
     /// Files and cameras don't go together, or silhouettes are damaged.
     #[error(transparent)]
     Session(#[from] multi_view::Error),
-    /// Scans don't make a model.
-    #[error(transparent)]
-    Scans(#[from] body_files::Error),
     /// No body is to be found.
     #[error(transparent)]
     Fit(#[from] shape_fit::Error),
-    /// A body model can't be, or not that body.
+    /// Scans don't make a model, or a body can't be.
     #[error(transparent)]
     Body(#[from] body::Error),
     /// No visual hull can be carved.

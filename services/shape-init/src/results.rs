@@ -1,7 +1,6 @@
 //! The files that people get of a body that was found.
 
-use body::{BodyModel, Shape};
-use body_files::Poses;
+use body::{BodyModel, Poses, Shape};
 use model::Image;
 use shape_fit::Fit;
 
@@ -32,7 +31,7 @@ pub(crate) fn body_files(
 ) -> Result<Vec<ResultFile>, InputError> {
     let poses: Vec<Vec<f64>> = fits.iter().map(|fit| fit.pose.clone()).collect();
     let motion = model.motion(shape, &poses, frame_rate)?;
-    let glb = body_files::glb(model, shape, Some(Poses { poses: &poses, frame_rate }))?;
+    let glb = body::glb(model, shape, Some(Poses { poses: &poses, frame_rate }))?;
     let file = |name: &str, media_type, content| ResultFile { name: name.to_owned(), media_type, content };
     let mut files = vec![
         file(BODY, "model/gltf-binary", glb),

@@ -38,7 +38,7 @@ impl Rpc {
             };
             let shape = described.shape(&model)?;
             let mesh = match request.format() {
-                MeshFormat::Glb => body_files::glb(&model, &shape, None).map_err(InputError::from)?,
+                MeshFormat::Glb => body::glb(&model, &shape, None).map_err(InputError::from)?,
                 MeshFormat::Ply => formats::ply::write(&shape.mesh(&model)),
             };
             let m = shape.measurements(&model);

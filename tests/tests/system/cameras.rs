@@ -59,7 +59,7 @@ fn keep(name: &str, bytes: &[u8]) -> Result<()> {
 #[test]
 fn a_body_is_found_in_the_masks_of_eight_cameras() -> Result<()> {
     let name = "a_body_is_found_in_the_masks_of_eight_cameras";
-    let Some(data) = testdata::shared(SYNTHETIC, name) else { return Ok(()) };
+    let Some(data) = testkit::shared::find(SYNTHETIC, name) else { return Ok(()) };
     let system = System::with_shape_init(2)?;
     let api = system.project("p")?;
     let calibration = fs::read(data.join("calibration.json"))?;
@@ -120,7 +120,7 @@ fn joint_error(shape: &Value, data: &Path) -> Result<f64> {
 #[test]
 fn a_real_capture_ends_in_a_body_or_in_words_that_help() -> Result<()> {
     let name = "a_real_capture_ends_in_a_body_or_in_words_that_help";
-    let Some(data) = testdata::shared(REAL, name) else { return Ok(()) };
+    let Some(data) = testkit::shared::find(REAL, name) else { return Ok(()) };
     let system = System::with_shape_init(2)?;
     let api = system.project("p")?;
     let mut files = vec![("Calib.qca.txt".to_owned(), fs::read(data.join("calibration/Calib.qca.txt"))?)];
@@ -152,7 +152,8 @@ fn a_real_capture_ends_in_a_body_or_in_words_that_help() -> Result<()> {
 
 #[test]
 fn what_cameras_cannot_have_seen_is_refused_with_the_file() -> Result<()> {
-    let Some(data) = testdata::shared(SYNTHETIC, "what_cameras_cannot_have_seen_is_refused_with_the_file")
+    let Some(data) =
+        testkit::shared::find(SYNTHETIC, "what_cameras_cannot_have_seen_is_refused_with_the_file")
     else {
         return Ok(());
     };
@@ -183,7 +184,7 @@ fn what_cameras_cannot_have_seen_is_refused_with_the_file() -> Result<()> {
 
 #[test]
 fn a_video_that_is_cut_short_is_named() -> Result<()> {
-    let Some(data) = testdata::shared(REAL, "a_video_that_is_cut_short_is_named") else { return Ok(()) };
+    let Some(data) = testkit::shared::find(REAL, "a_video_that_is_cut_short_is_named") else { return Ok(()) };
     let system = System::with_shape_init(2)?;
     let api = system.project("p")?;
     let calibration = fs::read(data.join("calibration/Calib.qca.txt"))?;

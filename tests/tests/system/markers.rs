@@ -50,9 +50,9 @@ fn warnings(report: &Value) -> String {
 #[test]
 fn a_recorded_walk_is_known_by_its_markers_and_reconstructed() -> Result<()> {
     let test = "a_recorded_walk_is_known_by_its_markers_and_reconstructed";
-    let Some(folder) = testdata::shared("data/markers", test) else { return Ok(()) };
+    let Some(folder) = testkit::shared::find("data/markers", test) else { return Ok(()) };
     let api = with_walks();
-    let walk = testdata::read(&folder, "opensim_walk_free_01.trc");
+    let walk = testkit::shared::read(&folder, "opensim_walk_free_01.trc");
     let session = api.session("walk", &[("walk.trc", &walk)])?;
     let (report, poses) = finished(api, &session, &json!({"motion_database": "drawn"}))?;
     let mut points: Vec<&str> = report["session"]["points"]

@@ -9,13 +9,13 @@ const SYNTHETIC: &str = "data/multiview/synthetic-8cam";
 #[test]
 fn json_and_yaml_of_the_synthetic_capture_are_the_same_cameras() {
     let test = "json_and_yaml_of_the_synthetic_capture_are_the_same_cameras";
-    let Some(folder) = testdata::shared(SYNTHETIC, test) else { return };
-    let of = |name: &str| read(name, &String::from_utf8(testdata::read(&folder, name)).unwrap());
+    let Some(folder) = testkit::shared::find(SYNTHETIC, test) else { return };
+    let of = |name: &str| read(name, &String::from_utf8(testkit::shared::read(&folder, name)).unwrap());
     let (json, json_warnings) = of("calibration.json");
     let (yaml, yaml_warnings) = of("calibration.yml");
     assert_eq!((json_warnings, yaml_warnings), (vec![], vec![]));
     assert_eq!((json.len(), yaml.len()), (8, 8));
-    let file: Value = serde_json::from_slice(&testdata::read(&folder, "calibration.json")).unwrap();
+    let file: Value = serde_json::from_slice(&testkit::shared::read(&folder, "calibration.json")).unwrap();
     for (index, (a, b)) in json.iter().zip(&yaml).enumerate() {
         assert_eq!((a.name.as_str(), a.size), (format!("cam{index}").as_str(), [1004, 1004]));
         assert_eq!((&a.name, a.size), (&b.name, b.size));
@@ -29,14 +29,17 @@ fn json_and_yaml_of_the_synthetic_capture_are_the_same_cameras() {
 #[test]
 fn joints_of_the_synthetic_capture_are_inside_its_silhouettes() {
     let test = "joints_of_the_synthetic_capture_are_inside_its_silhouettes";
-    let Some(folder) = testdata::shared(SYNTHETIC, test) else { return };
-    let (cameras, _) =
-        read("calibration.json", &String::from_utf8(testdata::read(&folder, "calibration.json")).unwrap());
-    let joints: Value = serde_json::from_slice(&testdata::read(&folder, "groundtruth/joints.json")).unwrap();
+    let Some(folder) = testkit::shared::find(SYNTHETIC, test) else { return };
+    let (cameras, _) = read(
+        "calibration.json",
+        &String::from_utf8(testkit::shared::read(&folder, "calibration.json")).unwrap(),
+    );
+    let joints: Value =
+        serde_json::from_slice(&testkit::shared::read(&folder, "groundtruth/joints.json")).unwrap();
     let list = joints["frames"][0]["joints"].as_array().unwrap();
     let (mut inside, mut all) = (0, 0);
     for camera in &cameras {
-        let mask = testdata::read(&folder, &format!("silhouettes/{}/0000.png", camera.name));
+        let mask = testkit::shared::read(&folder, &format!("silhouettes/{}/0000.png", camera.name));
         let mask = formats::image_files::read_silhouette(&mask, &formats::image_files::Limits::default())
             .unwrap()
             .value;

@@ -12,13 +12,13 @@ use crate::ring::{error, read};
 const POSE2SIM: &str = "data/multiview/pose2sim-demo";
 
 fn qualisys(folder: &Path) -> String {
-    String::from_utf8(testdata::read(folder, "calibration/Calib.qca.txt")).unwrap()
+    String::from_utf8(testkit::shared::read(folder, "calibration/Calib.qca.txt")).unwrap()
 }
 
 #[test]
 fn a_qualisys_calibration_is_in_64ths_of_pixels_and_millimetres_with_z_up() {
     let test = "a_qualisys_calibration_is_in_64ths_of_pixels_and_millimetres_with_z_up";
-    let Some(folder) = testdata::shared(POSE2SIM, test) else { return };
+    let Some(folder) = testkit::shared::find(POSE2SIM, test) else { return };
     let (cameras, warnings) = read("Calib.qca.txt", &qualisys(&folder));
     assert_eq!(warnings, Vec::<String>::new());
     let names: Vec<_> = cameras.iter().map(|camera| camera.name.as_str()).collect();
@@ -82,13 +82,13 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// Distances of the projected markers from the detections of the person who fits best, for each camera, pixels.
 fn reprojection(folder: &Path, cameras: &[Camera]) -> Vec<f64> {
-    let trc = testdata::read(folder, "results/balancing_body25b.trc");
+    let trc = testkit::shared::read(folder, "results/balancing_body25b.trc");
     let markers = trc::read(&trc, &PointsOptions::default()).unwrap().value;
     let of_camera = |camera: &Camera| {
         let mut distances = Vec::new();
         for frame in (0..markers.num_frames()).step_by(5) {
             let name = format!("pose/{0}_json/{0}.{frame:04}.json", camera.name);
-            let detections: Value = serde_json::from_slice(&testdata::read(folder, &name)).unwrap();
+            let detections: Value = serde_json::from_slice(&testkit::shared::read(folder, &name)).unwrap();
             let of_person = |person: &Value| -> Vec<f64> {
                 let number = |index: usize| person["pose_keypoints_2d"][index].as_f64().unwrap_or_default();
                 let mut distances = Vec::new();
@@ -118,7 +118,7 @@ fn reprojection(folder: &Path, cameras: &[Camera]) -> Vec<f64> {
 #[test]
 fn the_markers_of_the_qualisys_capture_are_where_its_cameras_saw_them() {
     let test = "the_markers_of_the_qualisys_capture_are_where_its_cameras_saw_them";
-    let Some(folder) = testdata::shared(POSE2SIM, test) else { return };
+    let Some(folder) = testkit::shared::find(POSE2SIM, test) else { return };
     let (cameras, _) = read("Calib.qca.txt", &qualisys(&folder));
     let medians = reprojection(&folder, &cameras);
     println!("median distance of each camera, pixels: {medians:.1?}");
@@ -155,7 +155,7 @@ fn the_markers_of_the_qualisys_capture_are_where_its_cameras_saw_them() {
 #[test]
 fn what_is_wrong_in_a_qualisys_file_is_told_with_its_line() {
     let test = "what_is_wrong_in_a_qualisys_file_is_told_with_its_line";
-    let Some(folder) = testdata::shared(POSE2SIM, test) else { return };
+    let Some(folder) = testkit::shared::find(POSE2SIM, test) else { return };
     let text = qualisys(&folder);
     let broken = text.replacen("r22=\"0.05946489349975602\"", "r22=\"nan\"", 1);
     assert_eq!(error("q.txt", &broken), "line 10: found transform r22=\"nan\", expected a number");

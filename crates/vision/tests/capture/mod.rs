@@ -12,8 +12,8 @@ pub struct Capture {
 
 /// `None` where the data is not there.
 pub fn frame_0(test: &str) -> Option<Capture> {
-    let folder = testdata::shared("data/multiview/synthetic-8cam", test)?;
-    let bytes = |name: &str| testdata::read(&folder, name);
+    let folder = testkit::shared::find("data/multiview/synthetic-8cam", test)?;
+    let bytes = |name: &str| testkit::shared::read(&folder, name);
     let calibration =
         calibration::read("calibration.json", &bytes("calibration.json"), &calibration::Options::default());
     let cameras = calibration.expect("calibration.json").value;

@@ -5,8 +5,7 @@ use axum::{
     http::{HeaderMap, header},
     response::{IntoResponse, Response},
 };
-use body::{BodyModel as Model, Sex, Wanted};
-use body_files::shipped;
+use body::{BodyModel as Model, Sex, Wanted, shipped};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
@@ -111,7 +110,7 @@ pub(super) async fn glb(
             }
         };
         let alpha = model.alpha_for(&wanted).map_err(|e| Error::Unprocessable(e.to_string()))?;
-        body_files::glb(&model, &model.shape(&alpha), None).map_err(|e| Error::Internal(e.to_string()))
+        body::glb(&model, &model.shape(&alpha), None).map_err(|e| Error::Internal(e.to_string()))
     });
     let bytes = made.await.map_err(|e| Error::Internal(format!("task: {e}")))??;
     Ok(whole(&format!("{}-{}.glb", found.name, found.version), "model/gltf-binary", bytes))

@@ -1,7 +1,7 @@
 //! Body models: made, shown, deleted. `shipped` is always there.
 
 use axum::{Json, extract::State, http::StatusCode};
-use body_files::shipped;
+use body::shipped;
 use chrono::{DateTime, Utc};
 use payloads::{BodyModelFile, SHIPPED};
 use queue::RunId;

@@ -3,8 +3,7 @@
 use std::{path::Path, time::Instant};
 
 use anyhow::{Context, bail};
-use body::{Aligned, LearnOptions};
-use body_files::{ScanOptions, ScanSet};
+use body::{Aligned, LearnOptions, ScanOptions, ScanSet};
 use evaluation::{Body, Distribution, ShapeErrors, shape_errors};
 use formats::archive::Entry;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -247,7 +246,7 @@ fn entries(folder: &Path) -> anyhow::Result<Vec<Entry>> {
     let mut entries = Vec::new();
     for file in files {
         let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if file.is_file() && body_files::is_used(&name) {
+        if file.is_file() && body::is_scan_file(&name) {
             entries.push(Entry { name, bytes: bytes(&file)? });
         }
     }

@@ -13,7 +13,7 @@ use std::{
 ///
 /// # Panics
 /// If it is not there and `CI` is `true`.
-pub fn shared(path: &str, test: &str) -> Option<PathBuf> {
+pub fn find(path: &str, test: &str) -> Option<PathBuf> {
     let root = env::var_os("MAREY_SHARED").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
         |folder| workspace().join(folder),

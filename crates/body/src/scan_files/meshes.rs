@@ -3,7 +3,8 @@
 use formats::archive::Entry;
 use nalgebra::Vector3;
 
-use crate::{Error, Result, tables::Table};
+use super::tables::Table;
+use crate::{Error, Result};
 
 /// A scan as its file has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,7 +34,7 @@ pub(crate) fn stem(name: &str) -> &str {
 }
 
 /// One scan a file; the person is the name up to `_`, unless `scans.csv` (columns `file`, `subject`, `pose`) says otherwise.
-pub(crate) fn of_files(
+pub(crate) fn from_files(
     files: &[Entry],
     index: Option<&Entry>,
     warnings: &mut Vec<String>,
@@ -60,7 +61,7 @@ pub(crate) fn of_files(
 }
 
 /// All scans in one array, shape `[scans, vertices, 3]`; `scans.csv` (columns `index`, `subject`, `pose`) says who they are.
-pub(crate) fn of_array(array: &Entry, index: Option<&Entry>) -> Result<Vec<RawScan>> {
+pub(crate) fn from_array(array: &Entry, index: Option<&Entry>) -> Result<Vec<RawScan>> {
     let read = formats::npy::read(&array.bytes).map_err(Error::in_file(&array.name))?;
     let [count, vertices, 3] = read.shape[..] else {
         let found = format!("an array of shape {:?}", read.shape);

@@ -1,15 +1,15 @@
 //! The files that a body model is learned from.
 
-use body::{LearnOptions, Learned, Scan, Subject, Template};
 use formats::archive::Entry;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    Error, Result, meshes,
-    meshes::{RawScan, stem},
+use super::{
+    file_use::FileUse,
+    meshes::{self, RawScan, stem},
+    rig::{RigEntries, template},
     tables,
-    template::{RigEntries, template},
 };
+use crate::{Error, LearnOptions, Learned, Result, Scan, Subject, Template, learn};
 
 /// Most scans of one model.
 const MAX_SCANS: usize = 4096;
@@ -37,47 +37,6 @@ pub struct ScanSet {
     pub warnings: Vec<String>,
 }
 
-/// Whether a file of that name is looked at; what systems hide in archives isn't.
-pub fn is_used(name: &str) -> bool {
-    Use::of(name) != Use::None
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Use {
-    Mesh,
-    TemplateMesh,
-    Vertices,
-    Faces,
-    Rig,
-    SkinJoints,
-    SkinWeights,
-    Scans,
-    Subjects,
-    None,
-}
-
-impl Use {
-    fn of(name: &str) -> Self {
-        let lower = name.to_ascii_lowercase();
-        let (folder, file) = lower.rsplit_once('/').unwrap_or(("", &lower));
-        if file.starts_with('.') || folder.split('/').any(|f| f.starts_with('.') || f == "__macosx") {
-            return Self::None;
-        }
-        match file {
-            "template.obj" | "template.ply" | "topology.obj" | "topology.ply" => Self::TemplateMesh,
-            "vertices.npy" => Self::Vertices,
-            "faces.npy" => Self::Faces,
-            "rig.json" => Self::Rig,
-            "skin_joints.npy" => Self::SkinJoints,
-            "skin_weights.npy" => Self::SkinWeights,
-            "scans.csv" => Self::Scans,
-            "subjects.csv" => Self::Subjects,
-            _ if file.ends_with(".obj") || file.ends_with(".ply") => Self::Mesh,
-            _ => Self::None,
-        }
-    }
-}
-
 impl ScanSet {
     /// Sorts the files out and reads them. Scans of other poses than the base pose are left out where a table says so.
     ///
@@ -85,16 +44,17 @@ impl ScanSet {
     /// [`Error`] names the file that is wrong.
     pub fn read(mut entries: Vec<Entry>, options: &ScanOptions) -> Result<Self> {
         entries.sort_by(|a, b| a.name.cmp(&b.name));
-        let one = |which: Use| only(&entries, which);
+        let one = |which: FileUse| only(&entries, which);
         let mut warnings = Vec::new();
-        let files: Vec<Entry> = entries.iter().filter(|e| Use::of(&e.name) == Use::Mesh).cloned().collect();
-        let index = one(Use::Scans)?;
-        let (mut scans, is_array) = match (one(Use::Vertices)?, files.is_empty()) {
-            (Some(array), true) => (meshes::of_array(array, index)?, true),
-            (None, false) => (meshes::of_files(&files, index, &mut warnings)?, false),
+        let files: Vec<Entry> =
+            entries.iter().filter(|e| FileUse::from_name(&e.name) == FileUse::Mesh).cloned().collect();
+        let index = one(FileUse::Scans)?;
+        let (mut scans, is_array) = match (one(FileUse::Vertices)?, files.is_empty()) {
+            (Some(array), true) => (meshes::from_array(array, index)?, true),
+            (None, false) => (meshes::from_files(&files, index, &mut warnings)?, false),
             (Some(array), false) => {
                 let found = format!("{} and {} meshes", array.name, files.len());
-                return Err(Error::Set {
+                return Err(Error::ScanSet {
                     found,
                     expected: "scans in one way: an array or one file each".into(),
                 });
@@ -102,12 +62,12 @@ impl ScanSet {
             (None, true) => {
                 let found = format!("{} files, no scan among them", entries.len());
                 let expected = "one OBJ or PLY a scan, or vertices.npy with faces.npy".into();
-                return Err(Error::Set { found, expected });
+                return Err(Error::ScanSet { found, expected });
             }
         };
         check_size(&scans)?;
         scale(&mut scans, options.metres_per_unit, is_array);
-        let (rest, faces) = match (one(Use::TemplateMesh)?, one(Use::Faces)?) {
+        let (rest, faces) = match (one(FileUse::TemplateMesh)?, one(FileUse::Faces)?) {
             (Some(entry), _) => {
                 let mesh = meshes::mesh(entry, &mut warnings)?;
                 (mesh.vertices, mesh.faces)
@@ -115,12 +75,12 @@ impl ScanSet {
             (None, faces) => first_mesh(&scans, faces)?,
         };
         let rig = RigEntries {
-            rig: one(Use::Rig)?,
-            skin_joints: one(Use::SkinJoints)?,
-            skin_weights: one(Use::SkinWeights)?,
+            rig: one(FileUse::Rig)?,
+            skin_joints: one(FileUse::SkinJoints)?,
+            skin_weights: one(FileUse::SkinWeights)?,
         };
         let template = template(&rest, &faces, &rig, &mut warnings)?;
-        let people = tables::subjects(one(Use::Subjects)?)?;
+        let people = tables::subjects(one(FileUse::Subjects)?)?;
         let subjects = scans.iter().map(|s| people.get(&s.subject).copied().unwrap_or_default()).collect();
         Ok(Self { template, scans, subjects, warnings })
     }
@@ -153,17 +113,17 @@ impl ScanSet {
     /// Learns a model.
     ///
     /// # Errors
-    /// [`Error::Body`] names the first scan that is not what it should be.
+    /// [`Error`] names the first scan that is not what it should be.
     pub fn learn(&self, options: &LearnOptions) -> Result<Learned> {
-        Ok(body::learn(&self.scans(), &self.template, options)?)
+        learn(&self.scans(), &self.template, options)
     }
 }
 
 /// The only file of a use, if there is any.
-fn only(entries: &[Entry], which: Use) -> Result<Option<&Entry>> {
-    let mut found = entries.iter().filter(|entry| Use::of(&entry.name) == which);
+fn only(entries: &[Entry], which: FileUse) -> Result<Option<&Entry>> {
+    let mut found = entries.iter().filter(|entry| FileUse::from_name(&entry.name) == which);
     match (found.next(), found.next()) {
-        (Some(first), Some(second)) => Err(Error::Set {
+        (Some(first), Some(second)) => Err(Error::ScanSet {
             found: format!("{} and {}", first.name, second.name),
             expected: format!("one {}", first.name.rsplit('/').next().unwrap_or_default()),
         }),
@@ -174,7 +134,7 @@ fn only(entries: &[Entry], which: Use) -> Result<Option<&Entry>> {
 fn check_size(scans: &[RawScan]) -> Result<()> {
     let vertices: usize = scans.iter().map(|scan| scan.vertices.len()).sum();
     if scans.len() < 2 || scans.len() > MAX_SCANS || vertices > MAX_VERTICES {
-        return Err(Error::Set {
+        return Err(Error::ScanSet {
             found: format!("{} scans in the base pose, of {vertices} vertices together", scans.len()),
             expected: format!("2 to {MAX_SCANS} of at most {MAX_VERTICES}"),
         });
@@ -205,7 +165,10 @@ fn first_mesh(scans: &[RawScan], faces: Option<&Entry>) -> Result<(Vec<nalgebra:
     }
     let Some(entry) = faces else {
         let found = format!("{} without faces.npy", stem(&first.name));
-        return Err(Error::Set { found, expected: "faces.npy of shape [faces, 3], or template.obj".into() });
+        return Err(Error::ScanSet {
+            found,
+            expected: "faces.npy of shape [faces, 3], or template.obj".into(),
+        });
     };
     let array = formats::npy::read(&entry.bytes).map_err(Error::in_file(&entry.name))?;
     let [_, 3] = array.shape[..] else {

@@ -1,10 +1,9 @@
 //! What all scans have in common: a rig and a skin, given with the scans or those of the shipped model.
 
-use body::{RigFile, Skin, Template, TemplateParts};
 use formats::archive::Entry;
 use nalgebra::Vector3;
 
-use crate::{Error, Result};
+use crate::{Error, Result, RigFile, Skin, Template, TemplateParts};
 
 /// The files of a rig.
 #[derive(Default)]
@@ -33,12 +32,12 @@ pub(crate) fn template(
         );
     }
     let parts = TemplateParts { faces, rest, rig: rig.as_ref(), skin: skin.as_ref(), known_joints: &[] };
-    Ok(Template::new(parts)?)
+    Template::new(parts)
 }
 
 /// A skin from two arrays of shape `[vertices, 4]`.
 fn given_skin(joints: &Entry, weights: &Entry) -> Result<Skin> {
-    let of = |entry: &Entry| -> Result<Vec<[f64; 4]>> {
+    let rows = |entry: &Entry| -> Result<Vec<[f64; 4]>> {
         let array = formats::npy::read(&entry.bytes).map_err(Error::in_file(&entry.name))?;
         match array.shape[..] {
             [_, 4] => Ok(array.values.chunks_exact(4).map(|row| [row[0], row[1], row[2], row[3]]).collect()),
@@ -49,7 +48,7 @@ fn given_skin(joints: &Entry, weights: &Entry) -> Result<Skin> {
             )),
         }
     };
-    let (indices, shares) = (of(joints)?, of(weights)?);
+    let (indices, shares) = (rows(joints)?, rows(weights)?);
     if let Some(found) = indices.iter().flatten().find(|j| !(0.0..256.0).contains(*j)) {
         return Err(Error::content(&joints.name, found.to_string(), "indices of joints"));
     }

@@ -1,6 +1,6 @@
 use std::sync::{Arc, OnceLock};
 
-use body::BodyModel;
+use crate::BodyModel;
 
 /// The model that comes with the program, read once a process.
 #[derive(Debug, Clone)]

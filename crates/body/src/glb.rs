@@ -1,10 +1,9 @@
 //! A body as GLB: the mesh at rest, its skeleton and skin, and poses as an animation.
 
-use body::{BodyModel, Posed, Shape};
 use formats::glb::{Animation, Joint, SkinnedMesh};
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::{Error, Result};
+use crate::{BodyModel, Error, Posed, Result, Shape};
 
 /// Poses of a body, one a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

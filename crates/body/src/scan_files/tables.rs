@@ -2,10 +2,9 @@
 
 use std::collections::HashMap;
 
-use body::{Sex, Subject};
 use formats::archive::Entry;
 
-use crate::{Error, Result};
+use crate::{Error, Result, Sex, Subject};
 
 /// Most rows of a table.
 const MAX_ROWS: usize = 100_000;
