@@ -6,7 +6,7 @@ set -euo pipefail
 shopt -s inherit_errexit
 cd "$(dirname "$0")/.."
 
-domain_crates=(model dense formats markers kinematics motion-db regression posterior sparse evaluation sample-motion contacts skeleton-fit body vision multi-view background shape-fit inverse-kinematics pose-prior tracking features)
+domain_crates=(model dense formats markers kinematics motion-db regression posterior sparse evaluation sample-motion contacts skeleton-fit body vision multi-view background shape-fit inverse-kinematics tracking features)
 impure_crate='tokio|tokio-.*|async-std|smol|mio|hyper|sqlx|sqlx-.*|tonic|tonic-.*|axum|axum-.*|reqwest|ureq|object_store'
 module='(fs|env|net|process)'
 impure_path="\bstd::$module\b|\bstd::\{[^;]*\b$module\b|\b(Instant|SystemTime)\b|\b(Utc|Local)::now\b"

@@ -53,4 +53,30 @@ pub enum Error {
     /// The database cannot be built.
     #[error(transparent)]
     Database(#[from] motion_db::Error),
+    /// A recording that the body can't follow.
+    #[error("{name}: {source}")]
+    Recording {
+        /// name of the recording
+        name: String,
+        /// what is wrong
+        source: inverse_kinematics::Error,
+    },
+    /// Poses of a database that make no motion.
+    #[error("{name}: {source}")]
+    Motion {
+        /// name of the clip
+        name: String,
+        /// what is wrong
+        source: model::Error,
+    },
+    /// Fewer training poses than were asked for.
+    #[error("the recordings have {found} poses, {every} seconds apart, expected at least {expected}")]
+    TooFewPoses {
+        /// poses found
+        found: usize,
+        /// seconds from one to the next
+        every: f64,
+        /// poses asked for
+        expected: usize,
+    },
 }

@@ -5,31 +5,33 @@
 //! - [`evaluate_sparse`]: trials reconstructed from their own control points, by [`Protocol`], in every case of a [`Sweep`]:
 //!   methods, windows, sizes of the database, noise, gaps.
 //! - [`shape_errors`]: how far a body found in silhouettes is from the true one; [`Distribution`] over many.
+//! - [`limbs`]: where inverse kinematics finds elbows and knees; [`recovery`]: how often a particle search finds a disturbed
+//!   pose again, with the [`training_poses`] of its prior.
 //! - [`Proportion`], [`PairedDifference`]: how often something succeeds, and whether one way does so oftener than another.
 //! - [`summarise`] into [`Row`]s, [`tables`] of them beside the papers' own, and HTML reports ([`report`]).
 
-mod body;
 mod calibration;
 mod case;
 mod disturbance;
 mod error;
 mod feet;
 mod gap;
+pub mod limbs;
 mod metrics;
 mod models;
+mod performer;
 mod proportion;
 mod protocol;
+pub mod recovery;
 pub mod report;
 mod shape;
 mod sparse_protocol;
 mod subset;
 mod summary;
 pub mod tables;
+pub mod training_poses;
 mod truth;
 
-pub use body::{
-    FeetResult, FootNumbers, SkeletonResult, SkeletonSource, SkeletonTrial, evaluate_feet, evaluate_skeletons,
-};
 pub use calibration::{Calibration, Count, DofGroup, WITHIN_ONE, WITHIN_TWO};
 pub use case::{Case, Sweep, Variant};
 pub use disturbance::{Gap, Hidden, Occlusion, disturbed};
@@ -37,6 +39,9 @@ pub use error::Error;
 pub use feet::{ContactThresholds, FootPaths, FootSlide, foot_slide};
 pub use gap::{GapErrors, gap_errors};
 pub use metrics::{Comparison, Errors, JointErrors, compare, compare_in_detail};
+pub use performer::{
+    FeetResult, FootNumbers, SkeletonResult, SkeletonSource, SkeletonTrial, evaluate_feet, evaluate_skeletons,
+};
 pub use proportion::{PairedDifference, Proportion, Verdict};
 pub use protocol::{ControlSet, Protocol};
 pub use shape::{Body, Distribution, ShapeErrors, shape_errors};

@@ -35,7 +35,6 @@
 
 mod chain;
 mod error;
-pub mod experiment;
 mod figure;
 pub mod flesh;
 pub mod follow;
@@ -45,6 +44,7 @@ pub mod limb;
 mod method;
 mod options;
 mod priority;
+pub mod recording;
 pub mod rig;
 mod solver;
 mod support;
@@ -56,6 +56,7 @@ pub use image::{ImageView, Overlap};
 pub use method::Method;
 pub use options::{Criterion, Options, Task};
 pub use priority::Priorities;
+pub use recording::Recording;
 pub use solver::{Evidence, Outcome, Solver};
 pub use support::{Support, SupportWidth};
 

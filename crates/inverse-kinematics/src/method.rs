@@ -19,7 +19,7 @@ pub enum Method {
 }
 
 /// Weight of the posture beside the overlap, an inverse square radian. Tuned on trials 13_17 and 07_01 of the CMU database.
-pub(crate) const POSTURE: f64 = 0.8;
+const POSTURE: f64 = 0.8;
 
 impl Method {
     /// Whether images are looked at.

@@ -9,7 +9,7 @@ use anyhow::Context;
 use body::{BodyModel, Posed, Wanted};
 use formats::{calibration, image_files, ply};
 use indicatif::ProgressBar;
-use inverse_kinematics::experiment::Recording;
+use inverse_kinematics::Recording;
 use model::{Camera, Mesh};
 use sample_motion::{Action, DrawOptions, FRAME_RATE, Model};
 use serde_json::{Value, json};

@@ -2,12 +2,11 @@
 
 use std::{f64::consts::PI, sync::Arc};
 
-use inverse_kinematics::experiment::cameras;
 use inverse_kinematics::limb::{self, Build, Limb};
 use inverse_kinematics::{ImageView, Support, SupportWidth};
 use model::Silhouette;
 use nalgebra::{Vector2, Vector3};
-use vision::DistanceField;
+use vision::{DistanceField, scene::Ring};
 
 /// An arm of 30 and 26 cm whose flesh is the bone.
 pub fn arm() -> Limb {
@@ -43,9 +42,18 @@ pub fn joints(limb: &Limb, x: &[f64]) -> Vec<Vector3<f64>> {
     positions
 }
 
-/// Pixels within 4 cm of the bones in the cameras of the experiment.
+/// Pixels within 4 cm of the bones in two cameras, a quarter of a turn apart.
 pub fn views(joints: &[Vector3<f64>]) -> Vec<ImageView> {
-    let seen = cameras().into_iter().map(|camera| {
+    let ring = Ring {
+        cameras: 4,
+        distance_m: 5.0,
+        heights_m: [1.5, 1.8],
+        target: Vector3::y(),
+        start: 0.6,
+        size: 640,
+        focal: 560.0,
+    };
+    let seen = ring.cameras().into_iter().take(2).map(|camera| {
         let pixels: Vec<_> = joints.iter().map(|joint| camera.project(joint).unwrap()).collect();
         let mut silhouette = Silhouette::empty(camera.size[0] as usize, camera.size[1] as usize);
         for y in 0..silhouette.height() {

@@ -4,8 +4,9 @@ use std::{path::PathBuf, time::Instant};
 
 use anyhow::{Context, bail};
 use body::{BodyModel, Shape};
+use evaluation::limbs::{LimbErrors, Limbs, Method, Still, run_all};
 use indicatif::{ProgressBar, ProgressStyle};
-use inverse_kinematics::experiment::{LimbErrors, Limbs, Method, Recording, Still, run_all};
+use inverse_kinematics::Recording;
 use model::{Motion, Silhouette};
 use motion_db::Clip;
 use sample_motion::{Action, DrawOptions, Model};

@@ -13,11 +13,11 @@ use std::{
 
 use anyhow::{Context, bail};
 use body::BodyModel;
+use evaluation::training_poses::training_poses;
 use indicatif::{ProgressBar, ProgressStyle};
 use model::{Camera, Silhouette};
 use motion_db::Clip;
 use nalgebra::Vector3;
-use pose_prior::training_poses;
 use shape_fit::{Fit, fit};
 use tracking::{ObservedFrame, Options, Part, ParticleOptions, Tracked, Tracker, built_in_poses};
 use vision::scene::SilhouetteNoise;

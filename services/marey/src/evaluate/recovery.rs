@@ -7,11 +7,9 @@ use std::path::PathBuf;
 
 use body::BodyModel;
 use clap::ValueEnum;
+use evaluation::recovery::{Limbs, Method, Setting, recover};
 use indicatif::{ProgressBar, ProgressStyle};
-use tracking::{
-    built_in_poses,
-    recovery::{Limbs, Method, Setting, recover},
-};
+use tracking::built_in_poses;
 use vision::scene::Ring;
 
 use super::written::write;

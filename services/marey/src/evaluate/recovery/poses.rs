@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use body::BodyModel;
 use clap::ValueEnum;
+use evaluation::training_poses::{covering, recorded_poses, training_poses};
 use motion_db::Clip;
-use pose_prior::{covering, recorded_poses, training_poses};
 use sample_motion::{Action, DrawOptions, Model};
 
 use crate::evaluate::motions;

@@ -1,11 +1,11 @@
 //! Success rates as a table, and the paper's claim.
 
+use evaluation::recovery::{FOUND_M, LARGE_WITHOUT, Method, Recovered, WITH_PRIOR, Way};
 use evaluation::{
     PairedDifference, Proportion, Verdict,
     tables::{Cell as Value, Table},
 };
 use serde::Serialize;
-use tracking::recovery::{FOUND_M, LARGE_WITHOUT, Method, Recovered, WITH_PRIOR, Way};
 
 /// A difference of success rates that doesn't matter.
 const MARGIN: f64 = 0.1;

@@ -1,12 +1,15 @@
 use std::sync::Arc;
 
 use body::{BodyModel, Posed, Shape};
+use inverse_kinematics::{
+    Evidence, ImageView, Outcome, Result, Solver, Support, limb,
+    recording::{LIMBS, rig_joints},
+};
 use model::Silhouette;
 use nalgebra::Vector3;
 use vision::{DistanceField, Rasteriser, Topology, View};
 
-use super::{LIMBS, Limbs, Method, Tracked, cameras, heading, rig_joints};
-use crate::{Evidence, ImageView, Outcome, Result, Solver, Support, limb};
+use super::{Limbs, Method, Tracked, cameras, heading};
 
 /// One limb in one frame, to be solved again and again from the same start: what is timed.
 #[derive(Debug, Clone)]

@@ -1,10 +1,10 @@
 use body::{BodyModel, Posed, Shape};
 use model::Mesh;
 use nalgebra::Vector3;
+use tracking::{Chance, Error, ObservedFrame, Result};
 use vision::scene::{SilhouetteNoise, silhouettes};
 
 use super::Setting;
-use crate::{Error, ObservedFrame, Result, random::Chance};
 
 /// What the first of a start's random numbers is for.
 const SHAPE: usize = 0;
@@ -52,7 +52,7 @@ impl Start {
     }
 
     /// Joints of the body in a pose, metres.
-    pub fn joints_of(&self, model: &BodyModel, pose: &[f64]) -> Vec<Vector3<f64>> {
+    pub fn joints_at(&self, model: &BodyModel, pose: &[f64]) -> Vec<Vector3<f64>> {
         let mut posed = Posed::default();
         self.shape.pose_joints(model, pose, &mut posed);
         posed.joints

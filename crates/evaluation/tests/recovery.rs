@@ -1,10 +1,8 @@
 //! Disturbed poses are found again, and by whom.
 
 use body::BodyModel;
-use tracking::{
-    built_in_poses,
-    recovery::{Limbs, Method, Setting, WITH_PRIOR, recover},
-};
+use evaluation::recovery::{Limbs, Method, Setting, WITH_PRIOR, recover};
+use tracking::built_in_poses;
 use vision::scene::Ring;
 
 #[test]

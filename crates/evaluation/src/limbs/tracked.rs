@@ -1,10 +1,13 @@
 use body::{BodyModel, Shape};
+use inverse_kinematics::{
+    Error, Evidence, ImageView, Result, Solver, SupportWidth,
+    flesh::along,
+    limb::{self, Build, Limb},
+    recording::{LIMBS, rig_joints},
+};
 use nalgebra::Vector3;
 
-use super::{LIMBS, Limbs, Method, rig_joints};
-use crate::flesh::along;
-use crate::limb::{self, Build, Limb};
-use crate::{Error, Evidence, ImageView, Result, Solver, SupportWidth};
+use super::{Limbs, Method};
 
 /// One limb being followed by one method.
 pub(super) struct Tracked {

@@ -1,10 +1,13 @@
 use body::{BodyModel, ROOT_DOFS};
-use inverse_kinematics::experiment::Recording;
+use inverse_kinematics::Recording;
 use model::Motion;
 use motion_db::MotionDatabase;
 use rayon::prelude::*;
 
-use crate::{Error, Result, covering, covering::squared};
+use super::covering::{covering, squared};
+use crate::Error;
+
+type Result<T> = std::result::Result<T, Error>;
 
 /// Poses of recordings are taken so far apart, seconds: a fifth of a second later people are in another pose.
 const EVERY_S: f64 = 0.2;
@@ -69,10 +72,10 @@ pub fn database_poses(
 /// from its nearest neighbour, and one odd pose would make it flat.
 ///
 /// # Errors
-/// [`Error::TooFew`] if there are not so many.
+/// [`Error::TooFewPoses`] if there are not so many.
 pub fn training_poses(poses: &[Vec<f64>], count: usize) -> Result<Vec<Vec<f64>>> {
     if poses.len() < count {
-        return Err(Error::TooFew { found: poses.len(), every: EVERY_S, expected: count });
+        return Err(Error::TooFewPoses { found: poses.len(), every: EVERY_S, expected: count });
     }
     let every = poses.len().div_ceil(MOST).max(1);
     let thinned: Vec<&[f64]> = poses.iter().step_by(every).map(Vec::as_slice).collect();

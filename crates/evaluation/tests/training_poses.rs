@@ -3,11 +3,14 @@
 use std::path::Path;
 
 use body::{BodyModel, Posed};
+use evaluation::{
+    Error,
+    training_poses::{covering, database_poses, recorded_poses, training_poses},
+};
 use kinematics::{Kinematics, Parametrisation, control_points};
 use model::Motion;
 use motion_db::{Clip, MotionDatabase};
 use nalgebra::Vector3;
-use pose_prior::{Error, covering, database_poses, recorded_poses, training_poses};
 
 const TRIALS: [&str; 6] = ["13_17", "07_01", "16_35", "64_01", "49_02", "91_02"];
 
@@ -54,7 +57,7 @@ fn directions(motion: &Motion) -> Vec<Vec<Vector3<f64>>> {
     frames.collect()
 }
 
-fn of_body(model: &BodyModel, pose: &[f64]) -> Vec<Vector3<f64>> {
+fn on_body(model: &BodyModel, pose: &[f64]) -> Vec<Vector3<f64>> {
     let mut posed = Posed::default();
     model.shape(&[]).pose_joints(model, pose, &mut posed);
     let at = |name: &str| posed.joints[model.rig().joint_index(name).unwrap()];
@@ -76,7 +79,7 @@ fn the_bodys_bones_point_as_the_recorded_ones_do() {
         let expected = directions(&motion);
         assert_eq!(poses.len(), expected.len());
         for (pose, expected) in poses.iter().zip(&expected) {
-            let found = of_body(&model, pose);
+            let found = on_body(&model, pose);
             degrees.extend(found.iter().zip(expected).map(|(a, b)| a.angle(b).to_degrees()));
             assert!(pose.iter().zip(model.rig().dofs()).all(|(x, dof)| {
                 dof.limits.is_none_or(|[low, high]| (low - 1e-6..=high + 1e-6).contains(x))
@@ -133,7 +136,7 @@ fn a_hundred_training_poses_are_near_to_all_that_people_did() {
     println!("width {narrow:.2} rad, with odd poses {wide:.2} rad");
     assert!(narrow < 0.8 * wide, "{narrow} {wide}");
     assert_eq!(training, training_poses(&poses, 100).unwrap());
-    assert!(matches!(training_poses(&poses[..50], 100), Err(Error::TooFew { found: 50, .. })));
+    assert!(matches!(training_poses(&poses[..50], 100), Err(Error::TooFewPoses { found: 50, .. })));
 }
 
 #[test]

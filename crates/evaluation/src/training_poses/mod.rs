@@ -7,12 +7,7 @@
 //! Metres, radians, y up; poses have shape `[dofs]` of the body's rig.
 
 mod covering;
-mod error;
 mod recorded;
 
 pub use covering::covering;
-pub use error::Error;
 pub use recorded::{database_poses, recorded_poses, training_poses};
-
-/// Result of the fallible functions of this crate.
-pub type Result<T> = std::result::Result<T, Error>;

@@ -2,35 +2,26 @@
 //!
 //! Recorded motion drives the morphable body ([`Recording`]), which is drawn into the cameras. Every limb is a chain of two
 //! joints of three rotations ([`limb`]); what it is told is where its base and its end are, and the
-//! silhouettes of the whole body, in two cameras. Judged is where its elbow or knee is found. Every frame starts from the solution of the one before; the
-//! first starts from a neutral posture.
+//! silhouettes of the whole body, in two cameras. Judged is where its elbow or knee is found. Every frame starts from
+//! the solution of the one before; the first starts from a neutral posture.
 
 use std::sync::Arc;
 
 use body::{BodyModel, Posed, Shape};
+use inverse_kinematics::{
+    ImageView, Options, Recording, Result, Support, SupportWidth, limb,
+    recording::{LIMBS, rig_joints},
+};
 use model::{Camera, Silhouette};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use vision::{DistanceField, Rasteriser, Topology, View, scene::Ring};
 
-use crate::method::POSTURE;
-use crate::{Error, ImageView, Options, Result, Support, SupportWidth, limb};
-
-mod recording;
 mod still;
 mod tracked;
 
-pub use recording::Recording;
 pub use still::Still;
 use tracked::Tracked;
-
-/// Joints of the CMU skeleton that correspond to the rig's; the last of each limb stands at the end of the one before.
-const LIMBS: [([&str; 3], [&str; 3]); 4] = [
-    (["lhumerus", "lradius", "lhand"], ["l_shoulder", "l_elbow", "l_wrist"]),
-    (["rhumerus", "rradius", "rhand"], ["r_shoulder", "r_elbow", "r_wrist"]),
-    (["lfemur", "ltibia", "lfoot"], ["l_hip", "l_knee", "l_ankle"]),
-    (["rfemur", "rtibia", "rfoot"], ["r_hip", "r_knee", "r_ankle"]),
-];
 
 /// Two arms or two legs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,14 +70,6 @@ pub fn cameras() -> Vec<Camera> {
         focal: 560.0,
     };
     ring.cameras().into_iter().take(2).collect()
-}
-
-fn rig_joints(model: &BodyModel, names: [&'static str; 3]) -> Result<[usize; 3]> {
-    let mut found = [0; 3];
-    for (found, name) in found.iter_mut().zip(names) {
-        *found = model.rig().joint_index(name).ok_or(Error::MissingJoint { name })?;
-    }
-    Ok(found)
 }
 
 /// Heading of the line between both shoulders or hips, radians.
@@ -147,8 +130,7 @@ impl Method {
 
     /// Image constraints from some cameras, with a neutral posture where the images say nothing.
     pub fn image(limbs: Limbs, cameras: &[usize]) -> Self {
-        let mut options = Options::image_constrained(&[limb::END]);
-        options.criterion.posture = POSTURE;
+        let options = inverse_kinematics::Method::ImageConstrained.options(&[limb::END]);
         let names: Vec<_> = cameras.iter().map(|camera| format!("{}", camera + 1)).collect();
         Self {
             name: format!("IK + view {}", names.join(" and ")),

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use body::BodyModel;
-use inverse_kinematics::experiment::{LimbErrors, Limbs, Method, Recording, run_all};
+use evaluation::limbs::{LimbErrors, Limbs, Method, run_all};
+use inverse_kinematics::Recording;
 use model::{Motion, Silhouette};
 use vision::scene::SilhouetteNoise;
 

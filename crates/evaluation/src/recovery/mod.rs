@@ -3,7 +3,7 @@
 //!
 //! A start is a body of its own shape in a true pose, seen by cameras, and that pose with limbs turned in every angle. All methods
 //! get the same starts. Local optimisation and searches are judged alone, as in the paper: one search over the DOFs of the
-//! turned limbs, nothing tried twice. [`Way::Marey`] is all that [`Tracker`](crate::Tracker) does in a frame.
+//! turned limbs, nothing tried twice. [`Way::Marey`] is all that [`Tracker`] does in a frame.
 
 mod start;
 
@@ -13,8 +13,8 @@ use body::BodyModel;
 use model::Camera;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use tracking::{Annealing, Options, ParticleOptions, Result, Tracker};
 
-use crate::{Annealing, Options, ParticleOptions, Result, Tracker};
 use start::Start;
 
 /// A joint that is farther off than this was not found, metres.
@@ -196,9 +196,9 @@ fn run(setting: &Setting<'_>, start: &Start, method: &Method<'_>) -> Result<Reco
     let search = tracker.search_dofs(frame, &start.disturbed, &start.disturbed, &dofs, &goes_on).flatten();
     let searched = search.map_or_else(|| start.disturbed.clone(), |search| search.pose);
     let refined = tracker.refine(frame, &start.disturbed, &[&searched], &goes_on);
-    let of = |pose: &[f64]| farthest(&start.joints_of(setting.model, pose), &start.joints);
-    let searched_m = of(&searched);
-    Ok(Recovered { searched_m, final_m: refined.map_or(searched_m, |pose| of(&pose)) })
+    let error_m = |pose: &[f64]| farthest(&start.joints_at(setting.model, pose), &start.joints);
+    let searched_m = error_m(&searched);
+    Ok(Recovered { searched_m, final_m: refined.map_or(searched_m, |pose| error_m(&pose)) })
 }
 
 fn farthest(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {

@@ -1,11 +1,32 @@
+//! Recorded motion of the CMU skeleton on the morphable body.
+
 use body::{BodyModel, Shape};
 use kinematics::{Kinematics, Parametrisation, control_points};
 use model::Motion;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{LIMBS, rig_joints};
-use crate::rig::RigChain;
-use crate::{Error, Evidence, Options, Result, Solver};
+use crate::{Error, Evidence, Options, Result, Solver, rig::RigChain};
+
+/// Joints of the CMU skeleton that correspond to the rig's; the last of each limb stands at the end of the one before.
+/// Arms, then legs; the left one first.
+pub const LIMBS: [([&str; 3], [&str; 3]); 4] = [
+    (["lhumerus", "lradius", "lhand"], ["l_shoulder", "l_elbow", "l_wrist"]),
+    (["rhumerus", "rradius", "rhand"], ["r_shoulder", "r_elbow", "r_wrist"]),
+    (["lfemur", "ltibia", "lfoot"], ["l_hip", "l_knee", "l_ankle"]),
+    (["rfemur", "rtibia", "rfoot"], ["r_hip", "r_knee", "r_ankle"]),
+];
+
+/// Indices of three joints of a body's rig, by their names.
+///
+/// # Errors
+/// [`Error::MissingJoint`] with the first that the rig has not.
+pub fn rig_joints(model: &BodyModel, names: [&'static str; 3]) -> Result<[usize; 3]> {
+    let mut found = [0; 3];
+    for (found, name) in found.iter_mut().zip(names) {
+        *found = model.rig().joint_index(name).ok_or(Error::MissingJoint { name })?;
+    }
+    Ok(found)
+}
 
 /// Recorded motion on the morphable body.
 #[derive(Debug, Clone, PartialEq)]
