@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Formatting, clippy with warnings denied, and the purity of the domain crates.
+# Formatting, the layers of the crates (directions, and purity of the domain), and clippy with warnings denied.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/phase.sh "formatting" cargo fmt --all --check
-scripts/phase.sh "purity of the domain crates" scripts/check-purity.sh --self-test
+scripts/phase.sh "layers" scripts/check-layers.sh --self-test
 scripts/phase.sh "clippy" cargo clippy --release --locked --workspace --all-targets -- -D warnings
