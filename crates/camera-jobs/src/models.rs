@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use body::{BodyModel, shipped};
 use payloads::{BodyModelFile, SHIPPED};
-use proto::ErrorCode;
+use proto::{CallError, ErrorCode};
 use queue::JobError;
 use service::{Cache, Resources, compute, objects};
 use uuid::Uuid;
@@ -103,9 +103,8 @@ pub enum ModelError {
     Catalogue(#[from] sqlx::Error),
 }
 
-impl ModelError {
-    /// What a caller is told.
-    pub fn code(&self) -> ErrorCode {
+impl CallError for ModelError {
+    fn code(&self) -> ErrorCode {
         match self {
             Self::Request(_) => ErrorCode::InvalidInput,
             Self::NoSuchModel(_) => ErrorCode::NotFound,

@@ -60,7 +60,7 @@ pub enum Error {
     },
 }
 
-/// The kinds of error that a service answers with. Each service's error says which kind it is.
+/// The kinds of error that a service answers with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ErrorCode {
@@ -80,14 +80,30 @@ pub enum ErrorCode {
     Internal,
 }
 
-impl ErrorCode {
-    /// The answer to the client. Faults of ours keep their detail to themselves: log it first.
-    pub fn status(self, message: impl std::fmt::Display) -> Status {
-        match self {
-            Self::Internal => Status::internal("internal error"),
-            code => Status::new(Code::from(code), message.to_string()),
+/// An error of a service's calls, which knows its kind.
+pub trait CallError: std::error::Error {
+    /// Which kind of error it is.
+    fn code(&self) -> ErrorCode;
+}
+
+/// The answer to a call that failed: the one place where errors become status codes and are logged.
+///
+/// What is wrong with a request is told to the client alone. What is wrong with the system is logged, with its causes, of
+/// which the message may say less: a fault of ours, of which the client is told nothing more, as an error; that something is
+/// away or not ready as a warning.
+pub fn status(error: &impl CallError) -> Status {
+    let code = error.code();
+    match code {
+        ErrorCode::Internal => {
+            tracing::error!(error = ?error, "call failed");
+            return Status::internal("internal error");
         }
+        ErrorCode::Unavailable | ErrorCode::NotReady => {
+            tracing::warn!(error = ?error, "call can't be answered now");
+        }
+        ErrorCode::InvalidInput | ErrorCode::NotFound | ErrorCode::TooLarge | ErrorCode::Cancelled => {}
     }
+    Status::new(Code::from(code), error.to_string())
 }
 
 impl From<ErrorCode> for Code {
@@ -104,8 +120,48 @@ impl From<ErrorCode> for Code {
     }
 }
 
+impl CallError for Error {
+    fn code(&self) -> ErrorCode {
+        ErrorCode::InvalidInput
+    }
+}
+
 impl From<Error> for Status {
     fn from(error: Error) -> Self {
-        ErrorCode::InvalidInput.status(error)
+        status(&error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, thiserror::Error)]
+    #[error("shard 3 of 2")]
+    struct Failed(ErrorCode);
+
+    impl CallError for Failed {
+        fn code(&self) -> ErrorCode {
+            self.0
+        }
+    }
+
+    #[test]
+    fn clients_are_told_everything_but_faults_of_ours() {
+        let told = |code| {
+            let status = status(&Failed(code));
+            (status.code(), status.message().to_owned())
+        };
+        assert_eq!(told(ErrorCode::Internal), (Code::Internal, "internal error".to_owned()));
+        for (code, expected) in [
+            (ErrorCode::InvalidInput, Code::InvalidArgument),
+            (ErrorCode::NotFound, Code::NotFound),
+            (ErrorCode::NotReady, Code::FailedPrecondition),
+            (ErrorCode::TooLarge, Code::ResourceExhausted),
+            (ErrorCode::Unavailable, Code::Unavailable),
+            (ErrorCode::Cancelled, Code::Cancelled),
+        ] {
+            assert_eq!(told(code), (expected, "shard 3 of 2".to_owned()));
+        }
     }
 }

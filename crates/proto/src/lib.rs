@@ -8,7 +8,7 @@ mod error;
 pub mod points;
 pub mod poses;
 
-pub use error::{Error, ErrorCode};
+pub use error::{CallError, Error, ErrorCode, status};
 
 /// Generated messages, clients and servers of package `marey.v1`.
 pub mod v1 {

@@ -57,9 +57,8 @@ pub enum Error {
     Catalogue(#[from] sqlx::Error),
 }
 
-impl Error {
-    /// Which kind of error it is.
-    pub fn code(&self) -> ErrorCode {
+impl proto::CallError for Error {
+    fn code(&self) -> ErrorCode {
         use service::motion_database::Error as File;
         match self {
             Self::Request(_) | Self::PageToken | Self::Kinematics(_) | Self::Model(_) => {
@@ -82,15 +81,10 @@ impl Error {
 
 impl From<Error> for tonic::Status {
     fn from(error: Error) -> Self {
-        // What another replica says of its shard is said of the whole.
-        let error = match error {
-            Error::Peer(status) => return *status,
-            error => error,
-        };
-        let code = error.code();
-        if matches!(code, ErrorCode::Internal | ErrorCode::Unavailable) {
-            tracing::error!(%error, "query failed");
+        match error {
+            // What another replica says of its shard is said of the whole.
+            Error::Peer(status) => *status,
+            error => proto::status(&error),
         }
-        code.status(error)
     }
 }

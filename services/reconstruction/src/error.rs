@@ -128,7 +128,7 @@ impl From<InputError> for JobError {
         // A run that was stopped is not one with bad input.
         match error {
             InputError::Sparse(sparse::Error::Stopped { .. }) => Self::Stopped,
-            error => Self::give_up(error.to_string(), format!("{error:?}")),
+            error => Self::bad_input(error),
         }
     }
 }
@@ -160,7 +160,7 @@ pub(crate) enum CallError {
     Panicked,
 }
 
-impl CallError {
+impl proto::CallError for CallError {
     fn code(&self) -> ErrorCode {
         match self {
             Self::Input(InputError::Sparse(sparse::Error::Stopped { .. })) => ErrorCode::Cancelled,
@@ -192,10 +192,6 @@ impl From<sparse::Error> for CallError {
 
 impl From<CallError> for tonic::Status {
     fn from(error: CallError) -> Self {
-        let code = error.code();
-        if matches!(code, ErrorCode::Unavailable | ErrorCode::NotReady) {
-            tracing::error!(error = ?error, "call failed");
-        }
-        code.status(error)
+        proto::status(&error)
     }
 }

@@ -128,8 +128,7 @@ impl Priors {
             move || WindowIndex::with_threads(&database, window, &AllCores)
         };
         let load = async {
-            let index =
-                compute::run(make).await.map_err(|e| JobError::give_up(e.to_string(), format!("{e:?}")))?;
+            let index = compute::run(make).await.map_err(JobError::bad_input)?;
             Ok::<_, JobError>((index, bytes))
         };
         self.indexes.get_or_load((file.blake3.clone(), window), load).await

@@ -34,7 +34,7 @@ impl From<InputError> for JobError {
         // A job that was stopped is not one with bad input.
         match error {
             InputError::Tracking(tracking::Error::Stopped { .. }) => Self::Stopped,
-            error => Self::give_up(error.to_string(), format!("{error:?}")),
+            error => Self::bad_input(error),
         }
     }
 }
@@ -50,16 +50,18 @@ pub(crate) enum CallError {
     Model(#[from] ModelError),
 }
 
+impl proto::CallError for CallError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::Input(InputError::Tracking(tracking::Error::Stopped { .. })) => ErrorCode::Cancelled,
+            Self::Request(_) | Self::Input(_) => ErrorCode::InvalidInput,
+            Self::Model(error) => error.code(),
+        }
+    }
+}
+
 impl From<CallError> for tonic::Status {
     fn from(error: CallError) -> Self {
-        let code = match &error {
-            CallError::Input(InputError::Tracking(tracking::Error::Stopped { .. })) => ErrorCode::Cancelled,
-            CallError::Request(_) | CallError::Input(_) => ErrorCode::InvalidInput,
-            CallError::Model(error) => error.code(),
-        };
-        if matches!(code, ErrorCode::Unavailable | ErrorCode::NotReady) {
-            tracing::error!(error = ?error, "call failed");
-        }
-        code.status(error)
+        proto::status(&error)
     }
 }

@@ -42,7 +42,7 @@ pub enum InputError {
 
 impl From<InputError> for JobError {
     fn from(error: InputError) -> Self {
-        Self::give_up(error.to_string(), format!("{error:?}"))
+        Self::bad_input(error)
     }
 }
 
@@ -75,15 +75,17 @@ impl From<ShapeError> for CallError {
     }
 }
 
+impl proto::CallError for CallError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::Request(_) | Self::Input(_) => ErrorCode::InvalidInput,
+            Self::Model(error) => error.code(),
+        }
+    }
+}
+
 impl From<CallError> for tonic::Status {
     fn from(error: CallError) -> Self {
-        let code = match &error {
-            CallError::Request(_) | CallError::Input(_) => ErrorCode::InvalidInput,
-            CallError::Model(error) => error.code(),
-        };
-        if matches!(code, ErrorCode::Unavailable | ErrorCode::NotReady) {
-            tracing::error!(error = ?error, "call failed");
-        }
-        code.status(error)
+        proto::status(&error)
     }
 }

@@ -119,6 +119,11 @@ impl JobError {
     pub fn give_up(message: impl Into<String>, detail: impl ToString) -> Self {
         Self::GiveUp { message: message.into(), detail: detail.to_string() }
     }
+
+    /// Bad input of which an error tells everything: its message is for the user, all that it holds for a developer.
+    pub fn bad_input(error: impl std::error::Error) -> Self {
+        Self::give_up(error.to_string(), format!("{error:?}"))
+    }
 }
 
 impl From<Error> for JobError {
