@@ -1,6 +1,10 @@
-//! What tests stand on: recordings that are not ours to ship, where there are any, and (feature `services`) a real
-//! PostgreSQL, thrown away afterwards.
+//! What tests stand on: recordings that are not ours to ship, where there are any; with feature `postgres` a real
+//! PostgreSQL, thrown away afterwards; with `services` all that a service needs, and motion to give to it.
 
-#[cfg(feature = "services")]
+#[cfg(feature = "postgres")]
 pub mod postgres;
+#[cfg(feature = "services")]
+pub mod sandbox;
 pub mod shared;
+#[cfg(feature = "services")]
+pub mod walker;

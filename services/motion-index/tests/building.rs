@@ -1,13 +1,13 @@
 //! Motion databases as their builds leave them: parts, versions, augmentation, shards, models, bad input.
 
 mod fixture;
-mod walker;
 
 use fixture::{Fixture, plan};
 use motion_db::{MotionDatabase, trial_of};
 use payloads::{Augment, MotionDatabaseFile, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm};
 use queue::RunState;
 use serde_json::{Value, json};
+use testkit::walker;
 use uuid::Uuid;
 
 fn names(database: &MotionDatabase) -> Vec<&str> {

@@ -1,13 +1,13 @@
 //! The service as a whole: a real PostgreSQL, a real folder, jobs through the queue, questions through gRPC.
 
 mod fixture;
-mod walker;
 
 use fixture::{Fixture, plan};
 use proto::v1::{self, motion_index_client::MotionIndexClient};
 use service::Config;
 use std::time::Duration;
 use store::Location;
+use testkit::walker;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, transport::Channel};
 use uuid::Uuid;
@@ -151,7 +151,7 @@ async fn health_and_reflection_are_served() {
         server_reflection_request::MessageRequest, server_reflection_response::MessageResponse,
     };
     let fixture = Fixture::new().await;
-    let mut health = HealthClient::new(fixture.channel_of(0).await);
+    let mut health = HealthClient::new(fixture.channel_at(0).await);
     for service in ["", "marey.v1.MotionIndex"] {
         let mut watch =
             health.watch(HealthCheckRequest { service: service.to_owned() }).await.unwrap().into_inner();
@@ -159,7 +159,7 @@ async fn health_and_reflection_are_served() {
             async { while watch.message().await.unwrap().unwrap().status() != ServingStatus::Serving {} };
         tokio::time::timeout(Duration::from_secs(30), serving).await.expect("never became ready");
     }
-    let mut reflection = ServerReflectionClient::new(fixture.channel_of(0).await);
+    let mut reflection = ServerReflectionClient::new(fixture.channel_at(0).await);
     let request = ServerReflectionRequest {
         host: String::new(),
         message_request: Some(MessageRequest::ListServices(String::new())),

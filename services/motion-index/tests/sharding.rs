@@ -1,12 +1,12 @@
 //! A divided database, served by replicas that share its shards, answers as an undivided one.
 
 mod fixture;
-mod walker;
 
 use fixture::{Fixture, plan};
 use payloads::PlanMotionDatabase;
 use proto::v1::{self, motion_index_client::MotionIndexClient};
 use std::net::{SocketAddr, TcpListener};
+use testkit::walker;
 use tonic::{Code, transport::Channel};
 use uuid::Uuid;
 
@@ -82,10 +82,10 @@ async fn three_shards_on_three_replicas_answer_as_one_index_and_so_do_those_that
     let divided = fixture.new_database("divided").await;
     fixture.build(&PlanMotionDatabase { shards: 3, ..plan(divided, files) }).await;
 
-    let expected = answers(&mut fixture.client_of(0).await, whole).await;
+    let expected = answers(&mut fixture.client_at(0).await, whole).await;
     assert_eq!(expected.0[3].len(), 8 * 119, "all windows of all clips");
     for replica in 0..3 {
-        let mut client = fixture.client_of(replica).await;
+        let mut client = fixture.client_at(replica).await;
         assert_eq!(answers(&mut client, divided).await, expected, "replica {replica}");
     }
     // The same by a stream.
@@ -96,7 +96,7 @@ async fn three_shards_on_three_replicas_answer_as_one_index_and_so_do_those_that
         num_matches: 9,
         shard: None,
     };
-    let mut client = fixture.client_of(1).await;
+    let mut client = fixture.client_at(1).await;
     let once = client.nearest_windows(request.clone()).await.unwrap().into_inner();
     let stream = tokio_stream::iter(vec![request.clone(), request.clone()]);
     let mut stream = client.stream_nearest_windows(stream).await.unwrap().into_inner();
@@ -106,7 +106,7 @@ async fn three_shards_on_three_replicas_answer_as_one_index_and_so_do_those_that
     drop((stream, client));
 
     let describe = v1::DescribeDatabaseRequest { database_id: divided.to_string() };
-    let mut client = fixture.client_of(2).await;
+    let mut client = fixture.client_at(2).await;
     let described = client.describe_database(describe).await.unwrap().into_inner();
     assert_eq!(described.clips.len(), 8);
     assert_eq!(described.summary.unwrap().num_shards, 3);
@@ -129,7 +129,7 @@ async fn three_shards_on_three_replicas_answer_as_one_index_and_so_do_those_that
     for left in [2, 1] {
         fixture.stop_service(0).await;
         for replica in 0..left {
-            let mut client = fixture.client_of(replica).await;
+            let mut client = fixture.client_at(replica).await;
             assert_eq!(answers(&mut client, divided).await, expected, "{left} left, replica {replica}");
         }
     }

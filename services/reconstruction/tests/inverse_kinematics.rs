@@ -8,10 +8,7 @@ use proto::v1::{
     self, InverseKinematicsMethod as Method, reconstruction_client::ReconstructionClient,
     solve_inverse_kinematics_request::Performer,
 };
-use service::{Config, Running};
-use store::Location;
-use testkit::postgres::TestDatabase;
-use tokio_util::sync::CancellationToken;
+use testkit::sandbox::{Sandbox, Service};
 use tonic::{Code, transport::Channel};
 use vision::scene::{Ring, silhouettes};
 
@@ -26,31 +23,11 @@ const MEASURED: [(&str, &str); 6] = [
 ];
 const INNER: [&str; 4] = ["l_elbow", "r_elbow", "l_knee", "r_knee"];
 
-struct Service {
-    client: ReconstructionClient<Channel>,
-    running: Running,
-    shutdown: CancellationToken,
-    _database: TestDatabase,
-    _folder: tempfile::TempDir,
-}
-
-impl Service {
-    async fn new() -> Self {
-        let database = TestDatabase::new().await.unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let listen = "127.0.0.1:0".parse().unwrap();
-        let config = Config::new(database.url(), Location::folder(folder.path()), listen);
-        let shutdown = CancellationToken::new();
-        let running = reconstruction::start(config, shutdown.clone()).await.unwrap();
-        let channel = Channel::from_shared(format!("http://{}", running.address)).unwrap();
-        let client = ReconstructionClient::new(channel.connect().await.unwrap());
-        Self { client, running, shutdown, _database: database, _folder: folder }
-    }
-
-    async fn stop(self) {
-        self.shutdown.cancel();
-        self.running.stopped().await.unwrap();
-    }
+async fn serve() -> (Sandbox, Service, ReconstructionClient<Channel>) {
+    let sandbox = Sandbox::new().await;
+    let service = sandbox.serve(reconstruction::start, |_| {}).await;
+    let client = ReconstructionClient::new(service.channel().await);
+    (sandbox, service, client)
 }
 
 /// A body that moves, what two cameras see of it, and its joints.
@@ -122,9 +99,9 @@ fn error(answer: &v1::SolveInverseKinematicsResponse, joints: &[Vec<Vector3<f64>
 
 #[tokio::test]
 async fn silhouettes_put_elbows_and_knees_where_they_are() {
-    let mut service = Service::new().await;
+    let (_sandbox, service, mut client) = serve().await;
     let Capture { request, joints } = capture();
-    let answer = service.client.solve_inverse_kinematics(request.clone()).await.unwrap().into_inner();
+    let answer = client.solve_inverse_kinematics(request.clone()).await.unwrap().into_inner();
     assert_eq!((answer.method(), answer.frames.len()), (Method::ImageConstrained, FRAMES));
     assert_eq!(answer.dof_names.len(), answer.frames[0].pose.as_ref().unwrap().values.len());
     for frame in &answer.frames {
@@ -132,7 +109,7 @@ async fn silhouettes_put_elbows_and_knees_where_they_are() {
     }
     let image = error(&answer, &joints);
     let blind = v1::SolveInverseKinematicsRequest { method: Method::Plain.into(), ..request.clone() };
-    let answer = service.client.solve_inverse_kinematics(blind).await.unwrap().into_inner();
+    let answer = client.solve_inverse_kinematics(blind).await.unwrap().into_inner();
     let plain = error(&answer, &joints);
     println!("elbows and knees: {image:.1} mm, without images {plain:.1} mm");
     assert!(image < 0.6 * plain && image < 30.0, "{image} {plain}");
@@ -141,19 +118,19 @@ async fn silhouettes_put_elbows_and_knees_where_they_are() {
     // without silhouettes there is another default
     let mut without = request;
     without.frames.iter_mut().for_each(|frame| frame.silhouettes.clear());
-    let answer = service.client.solve_inverse_kinematics(without).await.unwrap().into_inner();
+    let answer = client.solve_inverse_kinematics(without).await.unwrap().into_inner();
     assert_eq!(answer.method(), Method::Priority);
     service.stop().await;
 }
 
 #[tokio::test]
 async fn a_skeleton_file_is_solved_in_its_own_channels() {
-    let mut service = Service::new().await;
+    let (_sandbox, service, mut client) = serve().await;
     let model = BodyModel::shipped();
     let skeleton = model.skeleton(&model.shape(&[])).unwrap();
     let Capture { mut request, .. } = capture();
     request.performer = Some(Performer::SkeletonAsf(formats::asf::write(&skeleton)));
-    let answer = service.client.solve_inverse_kinematics(request).await.unwrap().into_inner();
+    let answer = client.solve_inverse_kinematics(request).await.unwrap().into_inner();
     assert_eq!(answer.dof_names.len(), skeleton.num_dofs());
     assert!(
         answer.frames[FRAMES - 1].residual_m.unwrap() < 0.02,
@@ -165,7 +142,7 @@ async fn a_skeleton_file_is_solved_in_its_own_channels() {
 
 #[tokio::test]
 async fn what_can_not_be_solved_is_refused_with_what_was_found() {
-    let mut service = Service::new().await;
+    let (_sandbox, service, mut client) = serve().await;
     let Capture { request, .. } = capture();
     let body = |change: &dyn Fn(&mut v1::BodyDescription)| {
         let mut body = v1::BodyDescription { body_model_id: "shipped".into(), ..Default::default() };
@@ -222,7 +199,7 @@ async fn what_can_not_be_solved_is_refused_with_what_was_found() {
         ),
     ];
     for (request, code, message) in cases {
-        let status = service.client.solve_inverse_kinematics(request).await.unwrap_err();
+        let status = client.solve_inverse_kinematics(request).await.unwrap_err();
         assert_eq!(status.code(), code, "{status}");
         assert!(status.message().contains(message), "{message:?} is not in {status}");
     }

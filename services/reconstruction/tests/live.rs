@@ -1,17 +1,12 @@
 //! Live streams as a gateway has them: real gRPC, a real PostgreSQL, a real folder.
 
-// The same walker as motion-index's tests: a test crate can't depend on another's.
-#[path = "../../motion-index/tests/walker/mod.rs"]
-mod walker;
-
-use motion_db::{Clip, MotionDatabase};
 use proto::v1::{self, LiveDelivery, live_client::LiveClient, live_request, live_response};
-use service::{Config, Running};
-use store::{Location, Store, key};
-use testkit::postgres::TestDatabase;
+use testkit::{
+    sandbox::{Sandbox, Service},
+    walker,
+};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
-use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 use uuid::Uuid;
 
@@ -19,25 +14,21 @@ const POINTS: [&str; 6] = ["left_wrist", "right_wrist", "left_ankle", "right_ank
 
 /// A service that follows two performers at once.
 struct Fixture {
-    running: Running,
-    shutdown: CancellationToken,
+    service: Service,
     motion_database: Uuid,
-    _database: TestDatabase,
-    _folder: tempfile::TempDir,
+    _sandbox: Sandbox,
 }
 
 impl Fixture {
     async fn new() -> Self {
-        let database = TestDatabase::new().await.unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let location = Location::folder(folder.path());
-        let id = add_motion_database(&Store::open(&location).unwrap(), &database).await;
-        let mut config = Config::new(database.url(), location, "127.0.0.1:0".parse().unwrap());
-        config.worker.concurrency = 0;
-        config.live.max_streams = 2;
-        let shutdown = CancellationToken::new();
-        let running = reconstruction::start(config, shutdown.clone()).await.unwrap();
-        Self { running, shutdown, motion_database: id, _database: database, _folder: folder }
+        let sandbox = Sandbox::new().await;
+        let motion_database = sandbox.add_walks().await.id;
+        let follow_two = |config: &mut service::Config| {
+            config.worker.concurrency = 0;
+            config.live.max_streams = 2;
+        };
+        let service = sandbox.serve(reconstruction::start, follow_two).await;
+        Self { service, motion_database, _sandbox: sandbox }
     }
 
     fn start(&self) -> v1::LiveStart {
@@ -54,7 +45,7 @@ impl Fixture {
         let (requests, receiver) = mpsc::channel(1000);
         let first = v1::LiveRequest { message: Some(live_request::Message::Start(start)) };
         requests.send(first).await.unwrap();
-        let mut client = LiveClient::connect(format!("http://{}", self.running.address)).await.unwrap();
+        let mut client = LiveClient::connect(self.service.address()).await.unwrap();
         let answers = client.follow(ReceiverStream::new(receiver)).await?.into_inner();
         Ok(Performer { requests, answers })
     }
@@ -87,42 +78,6 @@ impl Performer {
             }
         }
     }
-}
-
-/// Trials 1 to 4 as a motion database that is ready.
-async fn add_motion_database(store: &Store, database: &TestDatabase) -> Uuid {
-    let clip = |number: usize| Clip {
-        name: format!("7_{number:02}"),
-        subject: "7".to_owned(),
-        action: "walk".to_owned(),
-        motion: walker::motion(number, 480),
-    };
-    let built = MotionDatabase::build(&(1..=4).map(clip).collect::<Vec<_>>()).unwrap();
-    let (project, id) = (Uuid::now_v7(), Uuid::now_v7());
-    let stored = store
-        .put(&key::motion_database(id, 1, 1, "index.bin").unwrap(), built.to_bytes().into())
-        .await
-        .unwrap();
-    let pool = database.pool();
-    sqlx::query("INSERT INTO projects (id, name) VALUES ($1, 'lab')")
-        .bind(project)
-        .execute(&pool)
-        .await
-        .unwrap();
-    let sql = "INSERT INTO motion_databases
-                   (id, project_id, name, version, store_key, bytes, blake3, num_poses, num_clips, ready_at)
-               VALUES ($1, $2, 'walks', 1, $3, $4, $5, $6, 4, now())";
-    sqlx::query(sql)
-        .bind(id)
-        .bind(project)
-        .bind(stored.key.as_str())
-        .bind(stored.bytes as i64)
-        .bind(&stored.blake3)
-        .bind(built.num_poses() as i64)
-        .execute(&pool)
-        .await
-        .unwrap();
-    id
 }
 
 /// A frame of trial 7, which is not in the database.
@@ -182,7 +137,7 @@ async fn a_shutdown_gives_every_stream_its_state_to_go_on_elsewhere() {
         performer.send(frame.clone()).await;
         performer.answer().await.unwrap();
     }
-    fixture.shutdown.cancel();
+    fixture.service.shut_down();
     let (rest, status) = performer.rest().await;
     assert_eq!(status.code(), Code::Unavailable, "{status}");
     let state = last_state(&rest);
@@ -194,7 +149,7 @@ async fn a_shutdown_gives_every_stream_its_state_to_go_on_elsewhere() {
     performer.send(frames[30].clone()).await;
     let Some(live_response::Message::Pose(pose)) = performer.answer().await.unwrap() else { panic!() };
     assert!(pose.residual_m < 0.05, "{}", pose.residual_m);
-    fixture.running.stopped().await.unwrap();
+    fixture.service.stop().await;
 }
 
 #[tokio::test]

@@ -1,76 +1,54 @@
 //! The service as a whole: a real PostgreSQL, a real folder, runs through the queue, poses through gRPC.
 
-// The same walker as motion-index's tests: a test crate can't depend on another's.
-#[path = "../../motion-index/tests/walker/mod.rs"]
-mod walker;
-
-use motion_db::{Clip, MotionDatabase};
 use proto::v1::{self, reconstruction_client::ReconstructionClient};
-use queue::{Artefact, ChildJob, NewRun, ProjectId, RunId, RunState, RunStatus};
+use queue::{Artefact, RunId, RunState};
 use reconstruction::{InputFile, MotionDatabaseFile, PLAN_SPARSE, PlanSparse};
 use serde_json::Value;
-use service::{Config, Running};
 use sparse::Parameters;
-use sqlx::{PgPool, postgres::PgListener};
 use std::{collections::BTreeMap, time::Duration};
-use store::{Key, Location, Store, key};
-use testkit::postgres::TestDatabase;
-use tokio_util::sync::CancellationToken;
-use tonic::{Code, transport::Channel};
+use store::{Key, key};
+use testkit::{
+    sandbox::{Sandbox, Service},
+    walker,
+};
+use tonic::Code;
 use uuid::Uuid;
 
 const POINTS: [&str; 6] = ["left_wrist", "right_wrist", "left_ankle", "right_ankle", "root", "head"];
 /// Frames of a session at 120 Hz: 5 s, cut into chunks of one second.
 const FRAMES: usize = 600;
 
-/// A database, a store and a motion database of one test.
+/// A session and a motion database of one test.
 struct Fixture {
-    database: TestDatabase,
-    pool: PgPool,
-    store: Store,
-    location: Location,
-    project: Uuid,
+    sandbox: Sandbox,
     session: Uuid,
     prior: MotionDatabaseFile,
-    _folder: tempfile::TempDir,
 }
 
 impl Fixture {
     async fn new() -> Self {
-        let database = TestDatabase::new().await.unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let location = Location::folder(folder.path());
-        let store = Store::open(&location).unwrap();
-        let pool = database.pool();
-        let (project, session) = (Uuid::now_v7(), Uuid::now_v7());
-        sqlx::query("INSERT INTO projects (id, name) VALUES ($1, 'lab')")
-            .bind(project)
-            .execute(&pool)
-            .await
-            .unwrap();
-        sqlx::query("INSERT INTO sessions (id, project_id, name) VALUES ($1, $2, 'walk')")
-            .bind(session)
-            .bind(project)
-            .execute(&pool)
-            .await
-            .unwrap();
-        let prior = index_walks(&store, &pool, project).await;
-        Self { database, pool, store, location, project, session, prior, _folder: folder }
+        let sandbox = Sandbox::new().await;
+        let session = sandbox.add_session("walk").await;
+        let walks = sandbox.add_walks().await;
+        let prior = MotionDatabaseFile {
+            id: walks.id,
+            name: walks.name,
+            version: 1,
+            store_key: walks.store_key,
+            blake3: walks.blake3,
+            gplvm: None,
+        };
+        Self { sandbox, session, prior }
     }
 
     /// A service that runs so many jobs at once.
     async fn serve(&self, jobs: usize) -> Service {
-        let mut config =
-            Config::new(self.database.url(), self.location.clone(), "127.0.0.1:0".parse().unwrap());
-        config.worker.concurrency = jobs;
-        let shutdown = CancellationToken::new();
-        let running = reconstruction::start(config, shutdown.clone()).await.unwrap();
-        Service { running, shutdown }
+        self.sandbox.serve(reconstruction::start, |config| config.worker.concurrency = jobs).await
     }
 
     async fn upload(&self, name: &str, role: &str, content: impl Into<Vec<u8>>) -> InputFile {
-        let key = key::file(self.project, self.session, Uuid::now_v7());
-        let stored = self.store.put(&key, content.into().into()).await.unwrap();
+        let key = key::file(self.sandbox.project, self.session, Uuid::now_v7());
+        let stored = self.sandbox.put(&key, content).await;
         InputFile {
             name: name.to_owned(),
             role: role.to_owned(),
@@ -115,47 +93,19 @@ impl Fixture {
 
     async fn enqueue(&self, request: &PlanSparse) -> RunId {
         let payload = serde_json::to_value(request).unwrap();
-        let mut transaction = self.pool.begin().await.unwrap();
-        let run = NewRun {
-            project_id: ProjectId(self.project),
-            kind: "reconstruction",
-            session_id: Some(self.session),
-            parameters: payload.clone(),
-        };
-        let run = queue::enqueue_run(&mut transaction, &run).await.unwrap();
-        queue::enqueue_many(&mut transaction, run, &[ChildJob::new(PLAN_SPARSE, payload)]).await.unwrap();
-        transaction.commit().await.unwrap();
-        run
-    }
-
-    /// The run once it has ended.
-    async fn finished(&self, run: RunId) -> RunStatus {
-        let wait = async {
-            let mut changes = PgListener::connect_with(&self.pool).await.unwrap();
-            changes.listen(queue::channels::RUNS).await.unwrap();
-            loop {
-                let mut connection = self.pool.acquire().await.unwrap();
-                let status = queue::run_status(&mut connection, run).await.unwrap().unwrap();
-                if status.state.is_finished() {
-                    return status;
-                }
-                drop(connection);
-                changes.recv().await.unwrap();
-            }
-        };
-        tokio::time::timeout(Duration::from_secs(180), wait).await.expect("the run did not end")
+        self.sandbox.enqueue("reconstruction", Some(self.session), PLAN_SPARSE, payload).await
     }
 
     async fn succeeded(&self, run: RunId) -> BTreeMap<String, Artefact> {
-        let status = self.finished(run).await;
+        let status = self.sandbox.finished(run).await;
         assert_eq!(status.state, RunState::Succeeded, "{:?} {:?}", status.error_message, status.error_detail);
-        let mut connection = self.pool.acquire().await.unwrap();
+        let mut connection = self.sandbox.pool.acquire().await.unwrap();
         let results = queue::run_results(&mut connection, run).await.unwrap();
         results.into_iter().map(|artefact| (artefact.name.clone(), artefact)).collect()
     }
 
     /// Runs the request to its end and reads the motion.
-    async fn motion_of(&self, request: &PlanSparse) -> model::Motion {
+    async fn motion_from(&self, request: &PlanSparse) -> model::Motion {
         let results = self.succeeded(self.enqueue(request).await).await;
         let asf = formats::asf::read(self.text(&results["skeleton.asf"]).await.as_bytes()).unwrap().value;
         let amc = self.text(&results["motion.amc"]).await;
@@ -164,65 +114,8 @@ impl Fixture {
 
     async fn text(&self, artefact: &Artefact) -> String {
         let key: Key = artefact.store_key.parse().unwrap();
-        let content = self.store.get_checked(&key, &artefact.blake3, 1 << 30).await.unwrap();
+        let content = self.sandbox.store.get_checked(&key, &artefact.blake3, 1 << 30).await.unwrap();
         String::from_utf8(content.to_vec()).unwrap()
-    }
-}
-
-struct Service {
-    running: Running,
-    shutdown: CancellationToken,
-}
-
-impl Service {
-    async fn client(&self) -> ReconstructionClient<Channel> {
-        let address = format!("http://{}", self.running.address);
-        ReconstructionClient::new(Channel::from_shared(address).unwrap().connect().await.unwrap())
-    }
-
-    async fn stop(self) {
-        self.shutdown.cancel();
-        self.running.stopped().await.unwrap();
-    }
-}
-
-/// Trials 1 to 4 as a motion database that is ready.
-async fn index_walks(store: &Store, pool: &PgPool, project: Uuid) -> MotionDatabaseFile {
-    let clips: Vec<Clip> = (1..=4)
-        .map(|number| Clip {
-            name: format!("7_{number:02}"),
-            subject: "7".to_owned(),
-            action: "walk".to_owned(),
-            motion: walker::motion(number, 480),
-        })
-        .collect();
-    let database = MotionDatabase::build(&clips).unwrap();
-    let id = Uuid::now_v7();
-    let stored = store
-        .put(&key::motion_database(id, 1, 1, "index.mdb").unwrap(), database.to_bytes().into())
-        .await
-        .unwrap();
-    let sql = "INSERT INTO motion_databases
-                   (id, project_id, name, version, store_key, bytes, blake3, num_poses, num_clips, ready_at)
-               VALUES ($1, $2, 'walks', 1, $3, $4, $5, $6, $7, now())";
-    sqlx::query(sql)
-        .bind(id)
-        .bind(project)
-        .bind(stored.key.as_str())
-        .bind(stored.bytes as i64)
-        .bind(&stored.blake3)
-        .bind(database.num_poses() as i64)
-        .bind(clips.len() as i64)
-        .execute(pool)
-        .await
-        .unwrap();
-    MotionDatabaseFile {
-        id,
-        name: "walks".to_owned(),
-        version: 1,
-        store_key: stored.key.into(),
-        blake3: stored.blake3,
-        gplvm: None,
     }
 }
 
@@ -308,7 +201,7 @@ async fn cut_and_uncut_differ_by_less_than_half_a_degree() {
     let cut = fixture.request(files.clone());
     let mut uncut = fixture.request(files);
     uncut.parameters.chunk_frames = 1000;
-    let (cut, uncut) = (fixture.motion_of(&cut).await, fixture.motion_of(&uncut).await);
+    let (cut, uncut) = (fixture.motion_from(&cut).await, fixture.motion_from(&uncut).await);
     let errors = evaluation::compare(&uncut, &cut);
     assert!(errors.rms_deg < 0.5, "{errors:?}");
     service.stop().await;
@@ -345,7 +238,7 @@ async fn bad_input_fails_the_run_with_a_message_that_names_the_place() {
     let torn = fixture.upload("torn.csv", "control-points", torn).await;
     let other = fixture.upload("notes.txt", "control-points", "hello").await;
     let gone = InputFile {
-        store_key: key::file(fixture.project, fixture.session, Uuid::nil()).into(),
+        store_key: key::file(fixture.sandbox.project, fixture.session, Uuid::nil()).into(),
         ..good.clone()
     };
     let cut_asf = fixture.upload("cut.asf", "skeleton", &walker::ASF.as_bytes()[..900]).await;
@@ -362,7 +255,7 @@ async fn bad_input_fails_the_run_with_a_message_that_names_the_place() {
     for (files, points, expected) in cases {
         let mut request = fixture.request(files);
         request.points = points.into_iter().map(str::to_owned).collect();
-        let status = fixture.finished(fixture.enqueue(&request).await).await;
+        let status = fixture.sandbox.finished(fixture.enqueue(&request).await).await;
         assert_eq!(status.state, RunState::Failed, "{expected}");
         let message = status.error_message.unwrap();
         assert!(message.contains(expected), "{message:?} does not say {expected:?}");
@@ -376,7 +269,7 @@ async fn a_parameter_out_of_range_fails_the_run_and_is_named() {
     let service = fixture.serve(1).await;
     let mut request = fixture.request(vec![]);
     request.parameters.window = 99;
-    let status = fixture.finished(fixture.enqueue(&request).await).await;
+    let status = fixture.sandbox.finished(fixture.enqueue(&request).await).await;
     assert_eq!(status.error_message.as_deref(), Some("window is 99, expected 1 to 16 frames"));
     service.stop().await;
 }
@@ -385,7 +278,7 @@ async fn a_parameter_out_of_range_fails_the_run_and_is_named() {
 async fn a_pose_is_solved_at_once() {
     let fixture = Fixture::new().await;
     let service = fixture.serve(1).await;
-    let mut client = service.client().await;
+    let mut client = ReconstructionClient::new(service.channel().await);
     let motion = walker::motion(7, 60);
     let trajectories = evaluation::control_trajectories(&motion, &POINTS).unwrap();
     let request = v1::SolvePoseRequest {
@@ -453,10 +346,8 @@ async fn health_says_when_the_service_stops() {
     };
     let fixture = Fixture::new().await;
     let service = fixture.serve(1).await;
-    let channel =
-        Channel::from_shared(format!("http://{}", service.running.address)).unwrap().connect().await.unwrap();
     let request = HealthCheckRequest { service: "marey.v1.Reconstruction".to_owned() };
-    let mut watch = HealthClient::new(channel).watch(request).await.unwrap().into_inner();
+    let mut watch = HealthClient::new(service.channel().await).watch(request).await.unwrap().into_inner();
     let until = async |wanted: ServingStatus, watch: &mut tonic::Streaming<_>| {
         let follow = async {
             loop {
@@ -469,8 +360,8 @@ async fn health_says_when_the_service_stops() {
         tokio::time::timeout(Duration::from_secs(30), follow).await.expect("health did not change")
     };
     until(ServingStatus::Serving, &mut watch).await;
-    service.shutdown.cancel();
+    service.shut_down();
     until(ServingStatus::NotServing, &mut watch).await;
     drop(watch);
-    tokio::time::timeout(Duration::from_secs(30), service.running.stopped()).await.unwrap().unwrap();
+    service.stop().await;
 }

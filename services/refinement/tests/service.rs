@@ -7,38 +7,15 @@ use proto::v1::{
     CameraSilhouette, Pose, RefineFrameRequest, RefineOptions, RefineStage,
     refinement_client::RefinementClient,
 };
-use service::{Config, Running};
-use store::Location;
-use testkit::postgres::TestDatabase;
-use tokio_util::sync::CancellationToken;
+use testkit::sandbox::{Sandbox, Service};
 use tonic::{Code, transport::Channel};
 use vision::scene::{Ring, silhouettes};
 
-struct Service {
-    client: RefinementClient<Channel>,
-    running: Running,
-    shutdown: CancellationToken,
-    _database: TestDatabase,
-    _folder: tempfile::TempDir,
-}
-
-impl Service {
-    async fn new() -> Self {
-        let database = TestDatabase::new().await.unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let listen = "127.0.0.1:0".parse().unwrap();
-        let config = Config::new(database.url(), Location::folder(folder.path()), listen);
-        let shutdown = CancellationToken::new();
-        let running = refinement::start(config, shutdown.clone()).await.unwrap();
-        let channel = Channel::from_shared(format!("http://{}", running.address)).unwrap();
-        let client = RefinementClient::new(channel.connect().await.unwrap());
-        Self { client, running, shutdown, _database: database, _folder: folder }
-    }
-
-    async fn stop(self) {
-        self.shutdown.cancel();
-        self.running.stopped().await.unwrap();
-    }
+async fn serve() -> (Sandbox, Service, RefinementClient<Channel>) {
+    let sandbox = Sandbox::new().await;
+    let service = sandbox.serve(refinement::start, |_| {}).await;
+    let client = RefinementClient::new(service.channel().await);
+    (sandbox, service, client)
 }
 
 /// A drawn body with an arm lifted: the request without a start, its pose and joints.
@@ -75,9 +52,9 @@ fn largest_distance(answer: &proto::v1::RefineFrameResponse, truth: &Posed) -> f
 
 #[tokio::test]
 async fn a_pose_is_found_with_and_without_a_start() {
-    let mut service = Service::new().await;
+    let (_sandbox, service, mut client) = serve().await;
     let (request, pose, truth) = request();
-    let found = service.client.refine_frame(request.clone()).await.unwrap().into_inner();
+    let found = client.refine_frame(request.clone()).await.unwrap().into_inner();
     assert_eq!((found.limbs.len(), found.overlaps.len()), (10, 4));
     assert_eq!((found.joint_names.len(), found.dof_names.len()), (truth.joints.len(), pose.len()));
     assert!(found.overlaps.iter().all(|view| view.overlap > Some(0.9)), "{:?}", found.overlaps);
@@ -92,8 +69,8 @@ async fn a_pose_is_found_with_and_without_a_start() {
     let options = RefineOptions { frame: 7, ..RefineOptions::default() };
     let with_start =
         RefineFrameRequest { start: Some(Pose { values: start }), options: Some(options), ..request.clone() };
-    let found = service.client.refine_frame(with_start.clone()).await.unwrap().into_inner();
-    let again = service.client.refine_frame(with_start).await.unwrap().into_inner();
+    let found = client.refine_frame(with_start.clone()).await.unwrap().into_inner();
+    let again = client.refine_frame(with_start).await.unwrap().into_inner();
     assert_eq!(found, again);
     assert_ne!(found.stage(), RefineStage::Unseen);
     let off = largest_distance(&found, &truth);
@@ -103,7 +80,7 @@ async fn a_pose_is_found_with_and_without_a_start() {
 
 #[tokio::test]
 async fn requests_that_make_no_sense_are_refused_with_what_was_expected() {
-    let mut service = Service::new().await;
+    let (_sandbox, service, mut client) = serve().await;
     let (request, pose, _) = request();
     let with = |change: &dyn Fn(&mut RefineFrameRequest)| {
         let mut changed = request.clone();
@@ -127,13 +104,13 @@ async fn requests_that_make_no_sense_are_refused_with_what_was_expected() {
         (with(&|r| r.body_model_id = "mine".into()), "UUID"),
     ];
     for (request, said) in refused {
-        let status = service.client.refine_frame(request).await.unwrap_err();
+        let status = client.refine_frame(request).await.unwrap_err();
         assert_eq!(status.code(), Code::InvalidArgument, "{status}");
         assert!(status.message().contains(said), "{} does not say {said}", status.message());
     }
     let empty = image_files::write_silhouette(&model::Silhouette::empty(402, 402));
     let nobody = with(&|r| r.silhouettes.iter_mut().for_each(|view| view.image.clone_from(&empty)));
-    let status = service.client.refine_frame(nobody).await.unwrap_err();
+    let status = client.refine_frame(nobody).await.unwrap_err();
     assert_eq!(status.code(), Code::InvalidArgument, "{status}");
     service.stop().await;
 }

@@ -4,38 +4,15 @@ use body::BodyModel;
 use formats::{calibration, image_files, ply};
 use model::{Camera, Mesh};
 use proto::v1::{self, CameraSilhouette, MeshFormat, shape_init_client::ShapeInitClient};
-use service::{Config, Running};
-use store::Location;
-use testkit::postgres::TestDatabase;
-use tokio_util::sync::CancellationToken;
+use testkit::sandbox::{Sandbox, Service};
 use tonic::{Code, transport::Channel};
 use vision::scene::{Ring, silhouettes};
 
-struct Service {
-    client: ShapeInitClient<Channel>,
-    running: Running,
-    shutdown: CancellationToken,
-    _database: TestDatabase,
-    _folder: tempfile::TempDir,
-}
-
-impl Service {
-    async fn new() -> Self {
-        let database = TestDatabase::new().await.unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let listen = "127.0.0.1:0".parse().unwrap();
-        let config = Config::new(database.url(), Location::folder(folder.path()), listen);
-        let shutdown = CancellationToken::new();
-        let running = shape_init::start(config, shutdown.clone()).await.unwrap();
-        let channel = Channel::from_shared(format!("http://{}", running.address)).unwrap();
-        let client = ShapeInitClient::new(channel.connect().await.unwrap());
-        Self { client, running, shutdown, _database: database, _folder: folder }
-    }
-
-    async fn stop(self) {
-        self.shutdown.cancel();
-        self.running.stopped().await.unwrap();
-    }
+async fn serve() -> (Sandbox, Service, ShapeInitClient<Channel>) {
+    let sandbox = Sandbox::new().await;
+    let service = sandbox.serve(shape_init::start, |_| {}).await;
+    let client = ShapeInitClient::new(service.channel().await);
+    (sandbox, service, client)
 }
 
 fn sample(stature_m: Option<f64>) -> v1::SampleBodyRequest {
@@ -49,16 +26,16 @@ fn sample(stature_m: Option<f64>) -> v1::SampleBodyRequest {
 
 #[tokio::test]
 async fn the_shipped_model_is_described_and_bodies_are_drawn_from_it() {
-    let mut service = Service::new().await;
+    let (_sandbox, service, mut client) = serve().await;
     let request = v1::DescribeBodyModelRequest { body_model_id: "shipped".to_owned() };
-    let described = service.client.describe_body_model(request).await.unwrap().into_inner();
+    let described = client.describe_body_model(request).await.unwrap().into_inner();
     let shipped = BodyModel::shipped();
     assert_eq!(described.num_vertices as usize, shipped.num_vertices());
     assert_eq!(described.variance_kept, shipped.variance_kept());
     assert_eq!(described.dof_names.len(), shipped.rig().num_dofs());
     assert_eq!((described.joint_parents[0], described.joint_names.len()), (-1, shipped.rig().num_joints()));
 
-    let drawn = service.client.sample_body(sample(Some(1.83))).await.unwrap().into_inner();
+    let drawn = client.sample_body(sample(Some(1.83))).await.unwrap().into_inner();
     let measured = drawn.measurements.unwrap().stature_m;
     assert!((measured - 1.83).abs() < 1e-3, "stature {measured} m");
     let mesh = ply::read(&drawn.mesh).unwrap().value;
@@ -66,14 +43,14 @@ async fn the_shipped_model_is_described_and_bodies_are_drawn_from_it() {
 
     // what was drawn comes again from its coefficients
     let again = v1::SampleBodyRequest { alpha: drawn.alpha, ..sample(None) };
-    let again = service.client.sample_body(again).await.unwrap().into_inner();
+    let again = client.sample_body(again).await.unwrap().into_inner();
     assert_eq!(again.mesh, drawn.mesh);
     service.stop().await;
 }
 
 #[tokio::test]
 async fn a_hull_is_carved_from_silhouettes_and_holds_the_body() {
-    let mut service = Service::new().await;
+    let (_sandbox, service, mut client) = serve().await;
     let model = BodyModel::shipped();
     let mesh = model.shape(&[]).mesh(&model);
     let (calibration, silhouettes) = seen(&mesh);
@@ -84,7 +61,7 @@ async fn a_hull_is_carved_from_silhouettes_and_holds_the_body() {
         cell_m: 0.02,
         format: MeshFormat::Ply.into(),
     };
-    let hull = service.client.preview_hull(request.clone()).await.unwrap().into_inner();
+    let hull = client.preview_hull(request.clone()).await.unwrap().into_inner();
     let carved = ply::read(&hull.mesh).unwrap().value;
     let (low, high) = height(&carved);
     let (foot, crown) = height(&mesh);
@@ -96,21 +73,21 @@ async fn a_hull_is_carved_from_silhouettes_and_holds_the_body() {
 
     let mut wrong = request.clone();
     wrong.silhouettes[3].camera = "nine".to_owned();
-    let status = service.client.preview_hull(wrong).await.unwrap_err();
+    let status = client.preview_hull(wrong).await.unwrap_err();
     assert_eq!(status.code(), Code::InvalidArgument);
     assert!(status.message().contains("\"nine\"") && status.message().contains("cam0"), "{status}");
     let mut cut = request;
     cut.silhouettes[0].image.truncate(40);
-    let status = service.client.preview_hull(cut).await.unwrap_err();
+    let status = client.preview_hull(cut).await.unwrap_err();
     assert_eq!(status.code(), Code::InvalidArgument, "{status}");
     service.stop().await;
 }
 
 #[tokio::test]
 async fn bodies_that_nobody_has_are_refused_with_what_was_expected() {
-    let mut service = Service::new().await;
+    let (_sandbox, service, mut client) = serve().await;
     let unknown = v1::SampleBodyRequest { body_model_id: uuid::Uuid::now_v7().to_string(), ..sample(None) };
-    assert_eq!(service.client.sample_body(unknown).await.unwrap_err().code(), Code::NotFound);
+    assert_eq!(client.sample_body(unknown).await.unwrap_err().code(), Code::NotFound);
     let refused = [
         (v1::SampleBodyRequest { alpha: vec![f64::NAN], ..sample(None) }, "alpha"),
         (v1::SampleBodyRequest { alpha: vec![0.0; 99], ..sample(None) }, "99"),
@@ -119,12 +96,12 @@ async fn bodies_that_nobody_has_are_refused_with_what_was_expected() {
         (sample(Some(f64::INFINITY)), "stature"),
     ];
     for (request, said) in refused {
-        let status = service.client.sample_body(request).await.unwrap_err();
+        let status = client.sample_body(request).await.unwrap_err();
         assert_eq!(status.code(), Code::InvalidArgument, "{status}");
         assert!(status.message().contains(said), "{} does not say {said}", status.message());
     }
     let hull = v1::PreviewHullRequest { cell_m: 1e-9, ..Default::default() };
-    let status = service.client.preview_hull(hull).await.unwrap_err();
+    let status = client.preview_hull(hull).await.unwrap_err();
     assert!(status.code() == Code::InvalidArgument && status.message().contains("cell_m"), "{status}");
     service.stop().await;
 }

@@ -1,6 +1,5 @@
 //! A person made of sines who walks: an Acclaim skeleton with CMU's names, and trials of any length that differ by
 //! number. Small enough to be indexed in a moment; nothing about it is meant to look natural.
-#![allow(dead_code, reason = "every test binary uses a part")]
 
 use std::fmt::Write as _;
 
