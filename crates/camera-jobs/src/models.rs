@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use body::{BodyModel, shipped};
+use library::Cache;
 use payloads::{BodyModelFile, SHIPPED};
 use proto::{CallError, ErrorCode};
 use queue::JobError;
-use service::{Cache, Resources, compute, objects};
+use service::{Resources, compute, objects};
 use uuid::Uuid;
 
 /// What models take together in memory, bytes; one takes about six times its file.

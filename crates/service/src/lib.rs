@@ -4,25 +4,22 @@
 //! A service reads a [`Config`] once, calls [`telemetry::start`], and hands its gRPC routes and its worker
 //! to [`start`]. Tests and `marey up` do the same in one process.
 
-mod cache;
 pub mod compute;
 pub mod config;
 pub mod database;
 mod error;
 mod file_error;
 mod health;
-pub mod motion_database;
+pub mod log_format;
 pub mod objects;
 mod resources;
 mod server;
 pub mod shutdown;
 pub mod telemetry;
-mod threads;
+mod variables;
 
-pub use cache::Cache;
 pub use config::Config;
 pub use error::Error;
 pub use file_error::FileError;
 pub use resources::Resources;
 pub use server::{Parts, Running, start};
-pub use threads::AllCores;

@@ -8,15 +8,14 @@ use crate::{
     shards,
     sources::Sources,
 };
+use library::{
+    AllCores,
+    motion_database::{INDEX, SHARDS, Shard, ShardList, ShardedClip},
+};
 use motion_db::MotionDatabase;
 use queue::{Handler, JobContext, JobError, Outcome};
 use serde::Serialize;
-use service::{
-    AllCores, compute,
-    config::MemoryConfig,
-    motion_database::{INDEX, SHARDS, Shard, ShardList, ShardedClip},
-    objects,
-};
+use service::{compute, config::MemoryConfig, objects};
 use sqlx::{PgConnection, PgPool, types::Json};
 use std::io::{BufWriter, Seek};
 use store::{Key, Store, Stored, UploadLimits, key};

@@ -1,12 +1,12 @@
 //! Databases and what is worked out from them, kept in memory up to a bound.
 
 use crate::{Error, catalogue, catalogue::Row, search};
-use motion_db::{MotionDatabase, WindowIndex};
-use service::{
-    AllCores, Cache, compute,
-    config::MemoryConfig,
+use library::{
+    AllCores, Cache,
     motion_database::{self, Index, Opened, ShardList},
 };
+use motion_db::{MotionDatabase, WindowIndex};
+use service::{compute, config::MemoryConfig};
 use sqlx::PgPool;
 use std::sync::Arc;
 use store::Store;

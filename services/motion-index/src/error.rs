@@ -48,7 +48,7 @@ pub enum Error {
     },
     /// The object store failed, or does not hold what the catalogue says.
     #[error(transparent)]
-    File(#[from] service::motion_database::Error),
+    File(#[from] library::motion_database::Error),
     /// Another replica refused its part of the question.
     #[error("{}", .0.message())]
     Peer(Box<tonic::Status>),
@@ -59,7 +59,7 @@ pub enum Error {
 
 impl proto::CallError for Error {
     fn code(&self) -> ErrorCode {
-        use service::motion_database::Error as File;
+        use library::motion_database::Error as File;
         match self {
             Self::Request(_) | Self::PageToken | Self::Kinematics(_) | Self::Model(_) => {
                 ErrorCode::InvalidInput

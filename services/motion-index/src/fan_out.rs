@@ -11,8 +11,8 @@ use crate::{
     search::{self, Match, PointQuestion, WindowQuestion},
 };
 use futures::future::try_join_all;
+use library::motion_database::ShardList;
 use proto::v1;
-use service::motion_database::ShardList;
 use std::collections::HashMap;
 use tonic::Status;
 use uuid::Uuid;

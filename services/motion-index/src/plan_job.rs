@@ -6,10 +6,11 @@ use crate::{
     payload::{BuildMotionDatabase, ImportMotion},
 };
 use formats::archive::Entry;
+use library::{motion_database, motion_database::Index};
 use motion_db::MotionDatabase;
 use payloads::{MotionDatabaseFile, Object, PLAN_MOTION_DATABASE, PlanMotionDatabase};
 use queue::{Artefact, ChildJob, Handler, JobContext, JobError, Outcome};
-use service::{compute, config::MemoryConfig, motion_database, motion_database::Index, objects};
+use service::{compute, config::MemoryConfig, objects};
 use std::sync::Arc;
 use store::Store;
 
@@ -230,7 +231,7 @@ impl PlanHandler {
             let shard = shard.ok_or_else(|| motion_database::Error::List("is empty".to_owned()))?;
             shard.open(&self.store, most).await
         };
-        Ok(read.await.map_err(|error| error.of_job(&full_name(base)))?.database)
+        Ok(read.await.map_err(|error| error.into_job_error(&full_name(base)))?.database)
     }
 }
 

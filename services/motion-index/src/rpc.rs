@@ -2,9 +2,9 @@
 
 use crate::{Error, catalogue, catalogue::Row, fan_out::FanOut, search::Match};
 use futures::{Stream, StreamExt};
+use library::motion_database::{ShardList, ShardedClip};
 use motion_db::{ClipInfo, FRAME_RATE, MotionDatabase};
 use proto::v1::{self, motion_index_server::MotionIndex};
-use service::motion_database::{ShardList, ShardedClip};
 use std::{pin::Pin, sync::Arc};
 use tonic::{Request, Response, Status, Streaming};
 

@@ -6,9 +6,10 @@ use crate::{
     payload::{BuildMotionDatabase, PartReport},
     plan_job::{full_name, read_artefact},
 };
+use library::{motion_database, motion_database::Shard};
 use motion_db::{MotionDatabase, trial_of};
 use queue::{Artefact, JobContext, JobError};
-use service::{compute, motion_database, motion_database::Shard};
+use service::compute;
 use sqlx::PgPool;
 use std::{collections::BTreeSet, sync::Arc};
 use store::Store;
@@ -55,9 +56,9 @@ impl Sources {
         let mut connection = pool.acquire().await?;
         let artefacts = queue::dependency_artefacts(&mut connection, job.id()).await?;
         drop(connection);
-        for of_job in artefacts.chunk_by(|a, b| a.job_id == b.job_id) {
+        for left in artefacts.chunk_by(|a, b| a.job_id == b.job_id) {
             job.check()?;
-            let named = |name: &str| of_job.iter().map(|a| &a.artefact).find(|a| a.name == name);
+            let named = |name: &str| left.iter().map(|a| &a.artefact).find(|a| a.name == name);
             let Some(report) = named(REPORT) else { continue };
             let report = read_artefact(store, report).await?;
             let report: PartReport = serde_json::from_slice(&report).map_err(JobError::retry)?;
@@ -74,7 +75,7 @@ impl Sources {
     ) -> Result<(), JobError> {
         use motion_database::Index;
         let Some(base) = &payload.base else { return Ok(()) };
-        let failed = |error: motion_database::Error| error.of_job(&full_name(base));
+        let failed = |error: motion_database::Error| error.into_job_error(&full_name(base));
         let shards = match motion_database::read(store, &base.store_key, &base.blake3, max_bytes).await {
             Err(error) => return Err(failed(error)),
             Ok(Index::Whole(file)) => vec![file],
@@ -127,7 +128,7 @@ impl Sources {
         match (&self.files[source], &payload.base) {
             (Source::Base(shard), Some(base)) => {
                 let opened = shard.open(store, max_bytes).await;
-                Ok(opened.map_err(|error| error.of_job(&full_name(base)))?.database)
+                Ok(opened.map_err(|error| error.into_job_error(&full_name(base)))?.database)
             }
             (Source::Base(_), None) => Err(JobError::retry("an index file of no base")),
             (Source::Part(artefact), _) => {

@@ -1,10 +1,11 @@
 //! The job that trains a latent variable model of poses on a motion database.
 
 use crate::plan_job::full_name;
+use library::motion_database;
 use payloads::{TRAIN_GPLVM, TrainGplvm};
 use queue::{Handler, JobContext, JobError, Outcome};
 use regression::gplvm::TrainingOptions;
-use service::{compute, config::MemoryConfig, motion_database, objects};
+use service::{compute, config::MemoryConfig, objects};
 use sqlx::PgConnection;
 use std::ops::ControlFlow;
 use store::{Store, Stored, key};
@@ -38,7 +39,7 @@ impl Handler for TrainHandler {
         job.progress(0.0, "reading the motion database");
         let most = self.memory.database_cache_bytes;
         let opened = motion_database::open(&self.store, &file.store_key, &file.blake3, most).await;
-        let database = opened.map_err(|error| error.of_job(&full_name(file)))?.database;
+        let database = opened.map_err(|error| error.into_job_error(&full_name(file)))?.database;
         let of = job.clone();
         let model = compute::run(move || {
             let mut progress = |done: usize, planned: usize| {

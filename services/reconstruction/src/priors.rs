@@ -1,15 +1,14 @@
 //! Motion databases as priors, kept in memory up to a bound and shared by jobs and calls.
 
 use crate::payload::{MotionDatabaseFile, Object};
+use library::{
+    AllCores, Cache,
+    motion_database::{self, Opened},
+};
 use motion_db::{MotionDatabase, WindowIndex};
 use queue::JobError;
 use regression::gplvm::Gplvm;
-use service::{
-    AllCores, Cache, compute,
-    config::MemoryConfig,
-    motion_database::{self, Opened},
-    objects,
-};
+use service::{compute, config::MemoryConfig, objects};
 use sparse::{Parameters, Reconstructor, Session};
 use std::sync::Arc;
 use store::Store;
@@ -81,7 +80,8 @@ impl Priors {
         let load = async {
             let limit = self.databases.capacity_bytes();
             let opened = motion_database::open(&self.store, &file.store_key, &file.blake3, limit).await;
-            let opened = opened.map_err(|error| error.of_job(&format!("{}@{}", file.name, file.version)))?;
+            let opened =
+                opened.map_err(|error| error.into_job_error(&format!("{}@{}", file.name, file.version)))?;
             let (bytes, num_poses) = (opened.bytes, opened.database.num_poses());
             tracing::info!(database.name = file.name, num_poses, "motion database loaded");
             Ok::<_, JobError>((opened, bytes))

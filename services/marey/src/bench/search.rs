@@ -7,9 +7,9 @@ use std::{collections::HashSet, fs, io::BufWriter, path::PathBuf, time::Instant}
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use library::AllCores;
 use motion_db::{Augment, Clip, IndexFile, MotionDatabase, write_index};
 use serde::Serialize;
-use service::AllCores;
 
 use crate::evaluate::motions;
 use pass::{Measured, Search, Truth, measure};

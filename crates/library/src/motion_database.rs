@@ -1,10 +1,10 @@
 //! Motion databases in the object store: one index file, or a list of several that are the shards of one database.
 
-use crate::compute;
 use bytes::Bytes;
 use motion_db::{IndexFile, MotionDatabase, WindowIndex};
 use queue::JobError;
 use serde::{Deserialize, Serialize};
+use service::compute;
 use std::{str::FromStr, sync::Arc};
 use store::{Key, Store};
 
@@ -97,7 +97,7 @@ pub enum Error {
 impl Error {
     /// The error of a job that was told to read motion database `name`: only trouble with the store, or content that is
     /// not what was written, may pass by itself.
-    pub fn of_job(self, name: &str) -> JobError {
+    pub fn into_job_error(self, name: &str) -> JobError {
         match &self {
             Self::Map { .. } => JobError::retry(self),
             Self::Store(e) if e.is_transient() || matches!(e, store::Error::Corrupt { .. }) => {
