@@ -24,6 +24,7 @@
 //! ```
 
 mod error;
+mod extremes;
 mod file;
 mod glb;
 mod heat;
@@ -44,6 +45,7 @@ mod shape;
 mod shipped;
 mod skin;
 mod skinned;
+mod subject;
 mod template;
 
 pub use error::Error;
@@ -54,7 +56,7 @@ pub use jacobian::ShapeDrift;
 pub use learn::{Aligned, Alignment, LearnOptions, Learned, Scan, learn, unpose};
 pub use limb::Limb;
 pub use measure::{DENSITY_KG_M3, Measurements};
-pub use population::{Sex, Subject, Wanted};
+pub use population::Wanted;
 pub use pose::Posed;
 pub use registered::{RegisteredFit, RegisteredOptions, fit_registered};
 pub use regressor::JointRegressor;
@@ -64,6 +66,7 @@ pub use scan_files::{ScanOptions, ScanSet, is_scan_file};
 pub use shape::{BodyModel, MAX_COMPONENTS, MAX_VERTICES, ModelParts, Shape};
 pub use shipped::{Shipped, shipped};
 pub use skin::Skin;
+pub use subject::{Sex, Subject};
 pub use template::{KnownJoints, Template, TemplateParts};
 
 /// Result of the fallible functions of this crate.

@@ -6,27 +6,10 @@ use model::Mesh;
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::extremes::lowest_and_highest;
 use crate::measure::{DENSITY_KG_M3, heights};
+use crate::subject::{Sex, Subject};
 use crate::{BodyModel, Error, Result};
-
-/// Sex of a person, where scans tell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Sex {
-    /// female
-    Female,
-    /// male
-    Male,
-}
-
-/// What is known of a scanned person besides the scan.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Subject {
-    /// sex
-    pub sex: Option<Sex>,
-    /// age, years
-    pub age_years: Option<f64>,
-}
 
 /// Measurements that a body shall have; what is `None` is left to the population.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -180,7 +163,7 @@ impl BodyModel {
     }
 
     fn stature_slope(&self, vertices: &[Vector3<f64>]) -> Vec<f64> {
-        let [low, high] = crate::learn::ends(vertices);
+        let [low, high] = lowest_and_highest(vertices);
         let of = |i| self.displacement(i, high).y - self.displacement(i, low).y;
         (0..self.num_components()).map(of).collect()
     }

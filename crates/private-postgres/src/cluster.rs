@@ -10,6 +10,7 @@ use sqlx::postgres::{PgConnectOptions, PgSslMode};
 use sqlx::{AssertSqlSafe, Connection, Executor, PgConnection};
 
 use crate::Error;
+use crate::config::Config;
 use crate::programs::Programs;
 use crate::server_user::ServerUser;
 use crate::watchdog::Watchdog;
@@ -22,18 +23,6 @@ const PORT: u16 = 5432;
 
 /// `sun_path` of `sockaddr_un`, less its final NUL.
 const SOCKET_PATH_LIMIT: usize = 107;
-
-/// Where a cluster lives.
-#[derive(Debug, Clone)]
-pub struct Config {
-    /// Folder of the data, absolute; made when missing, given to the user that runs the server.
-    pub data_dir: PathBuf,
-    /// Folder of the socket, absolute and short; likewise.
-    pub socket_dir: PathBuf,
-    /// Whether the data survive a crash of the machine, and the end of this process. If not, nothing is
-    /// flushed to the disk and both folders are removed in the end.
-    pub durable: bool,
-}
 
 /// A cluster that runs. Dropping it stops it.
 pub struct PrivateCluster {

@@ -24,10 +24,12 @@
 //! ```
 
 mod cluster;
+mod config;
 mod error;
 mod programs;
 mod server_user;
 mod watchdog;
 
-pub use cluster::{Config, PrivateCluster, SUPERUSER};
+pub use cluster::{PrivateCluster, SUPERUSER};
+pub use config::Config;
 pub use error::Error;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 
 use crate::Error;
-use crate::cluster::Config;
+use crate::config::Config;
 use crate::programs::Programs;
 use crate::server_user::ServerUser;
 

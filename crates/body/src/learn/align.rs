@@ -5,9 +5,10 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 
 use super::check::check_scan;
-use super::{Alignment, LearnOptions, Scan, principal};
-use crate::population::Subject;
+use super::options::{Alignment, LearnOptions, Scan};
+use super::principal::principal;
 use crate::procrustes::rigid;
+use crate::subject::Subject;
 use crate::{BodyModel, Posed, RegisteredOptions, Result, Template, fit_registered};
 
 /// Components of the model of every round, and how far its vertices may be off, metres. The first components are size and

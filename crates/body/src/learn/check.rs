@@ -4,8 +4,10 @@ use std::collections::HashMap;
 
 use nalgebra::Vector3;
 
+use super::options::Scan;
+use crate::extremes::lowest_and_highest;
 use crate::procrustes::{Rigid, rigid};
-use crate::{Error, Scan, Template};
+use crate::{Error, Template};
 
 /// Heights of people who stand, metres.
 const HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.8..=2.6;
@@ -98,7 +100,7 @@ fn check_axes(scan: &[Vector3<f64>], template: &[Vector3<f64>]) -> Result<(), St
 }
 
 fn check_size(vertices: &[Vector3<f64>]) -> Result<(), String> {
-    let [low, high] = super::pca::ends(vertices).map(|vertex| vertices[vertex].y);
+    let [low, high] = lowest_and_highest(vertices).map(|vertex| vertices[vertex].y);
     let height = high - low;
     if HEIGHTS_M.contains(&height) {
         return Ok(());

@@ -1,5 +1,7 @@
 use nalgebra::{DMatrix, SymmetricEigen, Vector3};
 
+use crate::extremes::lowest_and_highest;
+
 /// Mean and principal components of shapes of one topology.
 pub struct Principal {
     /// shape `[vertices]`
@@ -45,7 +47,7 @@ pub fn principal_components(shapes: &[&[Vector3<f64>]], most: usize) -> Principa
     // Shapes that are all the same have no components.
     let is_there = |&i: &usize| eigen.eigenvalues[i] > 1e-12 * trace;
     let order: Vec<usize> = order.into_iter().take(most.min(n - 1)).filter(is_there).collect();
-    let [lowest, highest] = ends(&mean);
+    let [lowest, highest] = lowest_and_highest(&mean);
     let root = ((n - 1) as f64).sqrt();
     let (mut components, mut signed) = (Vec::new(), Vec::new());
     for &i in &order {
@@ -73,18 +75,4 @@ pub fn principal_components(shapes: &[&[Vector3<f64>]], most: usize) -> Principa
         mean,
         components,
     }
-}
-
-/// The lowest and the highest vertex.
-pub fn ends(vertices: &[Vector3<f64>]) -> [usize; 2] {
-    let (mut lowest, mut highest) = (0, 0);
-    for (index, vertex) in vertices.iter().enumerate() {
-        if vertex.y < vertices[lowest].y {
-            lowest = index;
-        }
-        if vertex.y > vertices[highest].y {
-            highest = index;
-        }
-    }
-    [lowest, highest]
 }
