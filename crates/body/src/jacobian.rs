@@ -36,7 +36,7 @@ impl ShapeDrift {
         }
     }
 
-    fn of_joint(&self, joint: usize, components: usize) -> &[Vector3<f64>] {
+    fn at_joint(&self, joint: usize, components: usize) -> &[Vector3<f64>] {
         &self.shifts[joint * components..(joint + 1) * components]
     }
 }
@@ -73,7 +73,7 @@ impl Posed {
         let mut blend = nalgebra::Matrix3::zeros();
         for (joint, weight) in model.skin.influences(vertex) {
             blend += self.world_from_rest[joint].rotation.matrix() * weight;
-            for (out, shift) in out.iter_mut().zip(drift.of_joint(joint, components)) {
+            for (out, shift) in out.iter_mut().zip(drift.at_joint(joint, components)) {
                 *out += shift * weight;
             }
         }
@@ -91,7 +91,7 @@ impl Posed {
         out: &mut [Vector3<f64>],
     ) {
         let rotation = self.world_from_rest[joint].rotation;
-        let shifts = drift.of_joint(joint, model.num_components());
+        let shifts = drift.at_joint(joint, model.num_components());
         for ((out, shift), moved) in out.iter_mut().zip(shifts).zip(&model.joint_components) {
             *out = shift + rotation * moved[joint];
         }

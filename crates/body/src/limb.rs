@@ -69,7 +69,7 @@ impl Limb {
     }
 
     /// Limb of every joint's bone, shape `[joints]`. A joint whose name says nothing belongs to its parent's.
-    pub fn of_joints(rig: &Rig) -> Vec<Self> {
+    pub fn for_joints(rig: &Rig) -> Vec<Self> {
         let mut limbs: Vec<Self> = Vec::new();
         for joint in rig.joints() {
             let inherited = joint.parent.map_or(Self::Torso, |parent| limbs[parent]);

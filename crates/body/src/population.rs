@@ -164,8 +164,8 @@ impl BodyModel {
 
     fn stature_slope(&self, vertices: &[Vector3<f64>]) -> Vec<f64> {
         let [low, high] = lowest_and_highest(vertices);
-        let of = |i| self.displacement(i, high).y - self.displacement(i, low).y;
-        (0..self.num_components()).map(of).collect()
+        let grows = |i| self.displacement(i, high).y - self.displacement(i, low).y;
+        (0..self.num_components()).map(grows).collect()
     }
 
     fn mass_slope(&self, vertices: &[Vector3<f64>]) -> Vec<f64> {
@@ -176,8 +176,10 @@ impl BodyModel {
                 by_vertex[*corner as usize] += normal * (DENSITY_KG_M3 / 6.0);
             }
         }
-        let of = |i| by_vertex.iter().enumerate().map(|(v, slope)| slope.dot(&self.displacement(i, v))).sum();
-        (0..self.num_components()).map(of).collect()
+        let slope = |i| {
+            by_vertex.iter().enumerate().map(|(v, gradient)| gradient.dot(&self.displacement(i, v))).sum()
+        };
+        (0..self.num_components()).map(slope).collect()
     }
 }
 

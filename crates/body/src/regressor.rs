@@ -61,10 +61,10 @@ impl JointRegressor {
     }
 
     /// The weighted mean of something that vertices have.
-    pub(crate) fn joint(&self, joint: usize, of_vertex: impl Fn(usize) -> Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn joint(&self, joint: usize, at_vertex: impl Fn(usize) -> Vector3<f64>) -> Vector3<f64> {
         let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
         for &(vertex, weight) in &self.rows[joint] {
-            sum += of_vertex(vertex as usize) * f64::from(weight);
+            sum += at_vertex(vertex as usize) * f64::from(weight);
             weights += f64::from(weight);
         }
         // Weights in single precision sum to 1 only nearly: a body far from the origin would shift its joints.

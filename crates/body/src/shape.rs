@@ -153,7 +153,7 @@ impl BodyModel {
             joints.clone().map(|joint| regressor.joint(joint, |vertex| c.displacement(vertex))).collect()
         };
         let joint_components = components.iter().map(of_component).collect();
-        let limbs_of_joints = Limb::of_joints(&rig);
+        let limbs_of_joints = Limb::for_joints(&rig);
         let limbs = skin.joints().iter().map(|joints| limbs_of_joints[usize::from(joints[0])]).collect();
         Ok(Self {
             description,

@@ -53,7 +53,7 @@ impl Template {
     pub fn new(parts: TemplateParts<'_>) -> Result<Self> {
         let TemplateParts { faces, rest, .. } = parts;
         check_template(rest, faces)?;
-        let Some(file) = parts.rig else { return Self::of_shipped(parts) };
+        let Some(file) = parts.rig else { return Self::from_shipped(parts) };
         let rig = file.rig()?;
         let at_rest = file.rest_joints();
         let regressor = match (file.regressor(rest.len())?, &at_rest) {
@@ -88,7 +88,7 @@ impl Template {
         Ok(Self { faces: faces.to_vec(), rest: rest.to_vec(), rig, regressor, skin })
     }
 
-    fn of_shipped(parts: TemplateParts<'_>) -> Result<Self> {
+    fn from_shipped(parts: TemplateParts<'_>) -> Result<Self> {
         let shipped = BodyModel::shipped();
         if shipped.faces != parts.faces || shipped.mean.len() != parts.rest.len() {
             return Err(Error::Template {

@@ -170,8 +170,9 @@ fn joints_fitted_to_some_people_are_those_of_others() {
     };
     let error = |template: &Template| {
         let others = 60..114;
-        let of = |i: usize| spread(distances(&template.regressor.joints(&data.scans[i]), &data.joints[i]))[0];
-        others.clone().map(of).sum::<f64>() / others.len() as f64
+        let mean_m =
+            |i: usize| spread(distances(&template.regressor.joints(&data.scans[i]), &data.joints[i]))[0];
+        others.clone().map(mean_m).sum::<f64>() / others.len() as f64
     };
     let fitted = error(&Template::new(parts).unwrap());
     let of_one = error(&Template::new(TemplateParts { known_joints: &[], ..parts }).unwrap());

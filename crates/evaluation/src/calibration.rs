@@ -59,21 +59,21 @@ impl DofGroup {
     }
 
     /// Group of each coordinate of a skeleton, shape `[dofs]`: by the names of the joints (CMU's and those of common BVH rigs).
-    pub fn of_skeleton(skeleton: &Skeleton, parametrisation: &Parametrisation) -> Vec<Self> {
+    pub fn for_skeleton(skeleton: &Skeleton, parametrisation: &Parametrisation) -> Vec<Self> {
         let mut groups = Vec::with_capacity(skeleton.num_dofs());
         for (j, joint) in skeleton.joints().iter().enumerate() {
             for dof in skeleton.dofs(j) {
                 groups.push(match (j, parametrisation.is_angle(dof)) {
                     (0, false) => Self::RootPosition,
                     (0, true) => Self::RootRotation,
-                    _ => Self::of_joint(&joint.name),
+                    _ => Self::for_joint(&joint.name),
                 });
             }
         }
         groups
     }
 
-    fn of_joint(name: &str) -> Self {
+    fn for_joint(name: &str) -> Self {
         const WORDS: [(DofGroup, &[&str]); 5] = [
             (DofGroup::Hands, &["hand", "finger", "thumb", "wrist", "index", "pinky", "middle", "ring"]),
             (DofGroup::Feet, &["foot", "toe", "ankle"]),
@@ -148,7 +148,7 @@ impl Calibration {
     pub fn measure(truth: &Motion, parametrisation: &Parametrisation, found: &[f64], sigmas: &[f64]) -> Self {
         let skeleton = truth.skeleton();
         let dofs = skeleton.num_dofs();
-        let groups = DofGroup::of_skeleton(skeleton, parametrisation);
+        let groups = DofGroup::for_skeleton(skeleton, parametrisation);
         let mut calibration = Self::default();
         let mut coordinates = vec![0.0; dofs];
         for (pose, (x, sigmas)) in truth.poses().zip(found.chunks_exact(dofs).zip(sigmas.chunks_exact(dofs)))
@@ -187,7 +187,7 @@ mod tests {
     fn joints_of_known_names_have_their_group() {
         let skeleton = body();
         let parametrisation = Parametrisation::smooth(&skeleton, &References::rest(&skeleton)).unwrap();
-        let groups = DofGroup::of_skeleton(&skeleton, &parametrisation);
+        let groups = DofGroup::for_skeleton(&skeleton, &parametrisation);
         let mut expected = vec![DofGroup::RootPosition; 3];
         expected.extend([DofGroup::RootRotation; 3]);
         expected.extend([DofGroup::Arms, DofGroup::Others]);
@@ -200,7 +200,7 @@ mod tests {
             ("upperneck", DofGroup::Trunk),
             ("ltoes", DofGroup::Feet),
         ] {
-            assert_eq!(DofGroup::of_joint(name), group, "{name}");
+            assert_eq!(DofGroup::for_joint(name), group, "{name}");
         }
     }
 

@@ -38,7 +38,7 @@ pub struct FootPaths {
 
 impl FootPaths {
     /// The balls of a motion's feet (see [`contacts::Feet`]); `None` if the skeleton has no feet of known names.
-    pub fn of(motion: &Motion) -> Option<Self> {
+    pub fn from_motion(motion: &Motion) -> Option<Self> {
         let tracks = Feet::find(motion.skeleton()).ok()?.tracks(motion);
         let path = |point: usize| tracks.positions.iter().map(|points| points[point]).collect();
         // Points are ankle and ball of the left foot, then of the right.

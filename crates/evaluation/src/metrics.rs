@@ -77,7 +77,7 @@ pub fn compare_in_detail(truth: &Motion, found: &Motion) -> Comparison {
         let mut of_frame = Sums::default();
         let (t, f) = (truth.pose(frame), found.pose(frame));
         for (j, joint) in skeleton.joints().iter().enumerate().skip(1) {
-            let angles = Sums::of_joint(joint, flips[j], &t[skeleton.dofs(j)], &f[skeleton.dofs(j)]);
+            let angles = Sums::for_joint(joint, flips[j], &t[skeleton.dofs(j)], &f[skeleton.dofs(j)]);
             of_frame.add(&angles);
             joints[j].add(&angles);
         }
@@ -126,7 +126,7 @@ struct Sums {
 
 impl Sums {
     /// Of the angles of a joint in one frame.
-    fn of_joint(joint: &Joint, can_flip: bool, truth: &[f64], found: &[f64]) -> Self {
+    fn for_joint(joint: &Joint, can_flip: bool, truth: &[f64], found: &[f64]) -> Self {
         let slot = |axis| {
             joint.channels.iter().position(|c| c.kind == ChannelKind::Rotation && c.axis == axis).unwrap_or(0)
         };

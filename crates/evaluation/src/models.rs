@@ -53,7 +53,7 @@ impl Models {
     }
 
     /// The model for a trial.
-    pub fn of_trial(&self, trial: usize) -> Option<&Gplvm> {
+    pub fn for_trial(&self, trial: usize) -> Option<&Gplvm> {
         self.folds.get(*self.of_trial.get(trial)?)
     }
 }

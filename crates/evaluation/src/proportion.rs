@@ -11,7 +11,8 @@ pub struct Proportion {
     /// successes
     pub found: usize,
     /// tries
-    pub of: usize,
+    #[serde(rename = "of")]
+    pub tries: usize,
     /// their share
     pub share: f64,
     /// Wilson's 95 % interval of the share (Wilson 1927)
@@ -20,19 +21,19 @@ pub struct Proportion {
 
 impl Proportion {
     /// Of tries, one after the other. Without any, the share is 0 and may be anything.
-    pub fn of(tries: impl IntoIterator<Item = bool>) -> Self {
-        let (mut found, mut of) = (0, 0);
-        for success in tries {
+    pub fn from_tries(outcomes: impl IntoIterator<Item = bool>) -> Self {
+        let (mut found, mut tries) = (0, 0);
+        for success in outcomes {
             found += usize::from(success);
-            of += 1;
+            tries += 1;
         }
-        if of == 0 {
-            return Self { found, of, share: 0.0, interval: [0.0, 1.0] };
+        if tries == 0 {
+            return Self { found, tries, share: 0.0, interval: [0.0, 1.0] };
         }
-        let (n, share) = (of as f64, found as f64 / of as f64);
+        let (n, share) = (tries as f64, found as f64 / tries as f64);
         let middle = (share + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
         let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt() / (1.0 + Z * Z / n);
-        Self { found, of, share, interval: [(middle - half).max(0.0), (middle + half).min(1.0)] }
+        Self { found, tries, share, interval: [(middle - half).max(0.0), (middle + half).min(1.0)] }
     }
 }
 
@@ -49,16 +50,16 @@ pub struct PairedDifference {
 
 impl PairedDifference {
     /// Of pairs of tries.
-    pub fn of(pairs: impl IntoIterator<Item = (bool, bool)>) -> Self {
-        let (mut only, mut of) = ([0, 0], 0usize);
+    pub fn from_pairs(pairs: impl IntoIterator<Item = (bool, bool)>) -> Self {
+        let (mut only, mut cases) = ([0, 0], 0usize);
         for (first, second) in pairs {
             only[0] += usize::from(first && !second);
             only[1] += usize::from(second && !first);
-            of += 1;
+            cases += 1;
         }
-        let difference = (only[0] as f64 - only[1] as f64) / of.max(1) as f64;
+        let difference = (only[0] as f64 - only[1] as f64) / cases.max(1) as f64;
         let [b, c] = only.map(|count| count as f64 + 0.5);
-        let n = of as f64 + 2.0;
+        let n = cases as f64 + 2.0;
         let middle = (b - c) / n;
         let half = Z * ((b + c) - (b - c) * (b - c) / n).max(0.0).sqrt() / n;
         Self { difference, interval: [(middle - half).max(-1.0), (middle + half).min(1.0)], only }
@@ -100,22 +101,22 @@ mod tests {
     #[test]
     fn wilsons_interval_is_as_printed() {
         // 81 of 263: Newcombe 1998, table I
-        let found = Proportion::of((0..263).map(|i| i < 81));
+        let found = Proportion::from_tries((0..263).map(|i| i < 81));
         assert!((found.interval[0] - 0.2553).abs() < 1e-4 && (found.interval[1] - 0.3662).abs() < 1e-4);
-        let none = Proportion::of((0..20).map(|_| false));
+        let none = Proportion::from_tries((0..20).map(|_| false));
         assert!(none.interval[0] == 0.0 && (none.interval[1] - 0.1611).abs() < 1e-3, "{none:?}");
-        assert_eq!(Proportion::of([]).interval, [0.0, 1.0]);
+        assert_eq!(Proportion::from_tries([]).interval, [0.0, 1.0]);
     }
 
     #[test]
     fn pairs_that_agree_show_that_two_are_equal_and_few_show_nothing() {
-        let same = PairedDifference::of((0..100).map(|i| (i % 3 == 0, i % 3 == 0)));
+        let same = PairedDifference::from_pairs((0..100).map(|i| (i % 3 == 0, i % 3 == 0)));
         assert_eq!((same.difference, same.verdict(0.1)), (0.0, Verdict::Equal));
-        let few = PairedDifference::of((0..10).map(|i| (i > 1, i > 3)));
+        let few = PairedDifference::from_pairs((0..10).map(|i| (i > 1, i > 3)));
         assert_eq!((few.only, few.verdict(0.1)), ([2, 0], Verdict::Undecided));
-        let better = PairedDifference::of((0..100).map(|i| (i > 10, i > 50)));
+        let better = PairedDifference::from_pairs((0..100).map(|i| (i > 10, i > 50)));
         assert_eq!(better.verdict(0.1), Verdict::Better);
-        let worse = PairedDifference::of((0..100).map(|i| (i > 50, i > 10)));
+        let worse = PairedDifference::from_pairs((0..100).map(|i| (i > 50, i > 10)));
         assert_eq!((worse.difference, worse.verdict(0.1)), (-0.4, Verdict::Worse));
     }
 }

@@ -85,7 +85,7 @@ pub struct Distribution {
 
 impl Distribution {
     /// Of these figures; `None` if there are none.
-    pub fn of(figures: impl IntoIterator<Item = f64>) -> Option<Self> {
+    pub fn from_figures(figures: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut figures: Vec<f64> = figures.into_iter().collect();
         figures.sort_by(f64::total_cmp);
         let (count, max) = (figures.len(), *figures.last()?);
@@ -142,8 +142,8 @@ mod tests {
 
     #[test]
     fn a_distribution_of_ten_has_its_ninth_at_ninety_percent() {
-        let found = Distribution::of((1..=10).rev().map(f64::from)).unwrap();
+        let found = Distribution::from_figures((1..=10).rev().map(f64::from)).unwrap();
         assert_eq!((found.median, found.mean, found.percentile_90, found.max), (5.5, 5.5, 9.0, 10.0));
-        assert_eq!(Distribution::of([]), None);
+        assert_eq!(Distribution::from_figures([]), None);
     }
 }

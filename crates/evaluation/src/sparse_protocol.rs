@@ -215,7 +215,7 @@ impl<'a> Bench<'a> {
         let points = control_points(truth.skeleton(), names)?;
         let session = Session::new(truth.skeleton().clone(), points, &measured)?;
         let mut reconstructor = Reconstructor::new(database, index, &session, &parameters)?;
-        if let Some(model) = models.of_trial(task.trial) {
+        if let Some(model) = models.for_trial(task.trial) {
             reconstructor = reconstructor.with_model(model)?;
         }
         reconstructor.learn_zero_pose()?;
@@ -224,8 +224,8 @@ impl<'a> Bench<'a> {
             .reconstruct(0..session.num_frames(), &mut |_| std::ops::ControlFlow::Continue(()))?;
         let end = seconds();
         let motion = to_motion(database, &session, &parameters, &found)?;
-        let slide = FootPaths::of(&truth)
-            .zip(FootPaths::of(&motion))
+        let slide = FootPaths::from_motion(&truth)
+            .zip(FootPaths::from_motion(&motion))
             .and_then(|(truth, found)| foot_slide(&truth, &found, &ContactThresholds::default()));
         Ok(Some(TrialResult {
             case: case.clone(),

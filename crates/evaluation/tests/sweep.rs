@@ -173,15 +173,15 @@ fn noise_and_gaps_cost(rows: &[Row]) {
         r.action == ALL && case.variant.is_empty() && case.window == 2 && case.database_poses == 480
     };
     for method in [Method::LocalRegression, Method::Nearest] {
-        let of = |noise_mm: f64, hidden: bool| {
+        let row = |noise_mm: f64, hidden: bool| {
             let found = rows.iter().filter(plain).find(|r| {
                 r.case.method == method && r.case.noise_mm == noise_mm && r.case.occlusion.is_some() == hidden
             });
             found.unwrap()
         };
-        assert!(of(10.0, false).mpjpe_cm > of(0.0, false).mpjpe_cm, "{method}: noise is no gain");
-        assert!(of(0.0, false).gap.is_none());
-        let gap = of(0.0, true).gap.unwrap();
+        assert!(row(10.0, false).mpjpe_cm > row(0.0, false).mpjpe_cm, "{method}: noise is no gain");
+        assert!(row(0.0, false).gap.is_none());
+        let gap = row(0.0, true).gap.unwrap();
         assert_eq!(gap.trials, 2);
         assert!(gap.mean.inside_cm > gap.mean.inside_undisturbed_cm, "{method}: {gap:?}");
     }

@@ -96,7 +96,7 @@ impl RigChain {
             .with_segments(segments)?
             .with_widths(widths)?
             .with_limits(limits)?;
-        let limbs = Limb::of_joints(rig);
+        let limbs = Limb::for_joints(rig);
         let is_twist = |&place: &usize| {
             let dof = &rig.dofs()[rig_dofs[place]];
             let of_joint = |&&d: &&usize| rig.dofs()[d].joint == dof.joint;
@@ -150,7 +150,7 @@ struct Drawn {
 /// `last`: the skeleton's joint that carries each joint's bone.
 fn draw(model: &BodyModel, shape: &Shape, last: &[usize], points: &mut Vec<ControlPoint>) -> Drawn {
     let joints = model.rig().joints();
-    let limbs = Limb::of_joints(model.rig());
+    let limbs = Limb::for_joints(model.rig());
     let is_trunk = |joint: usize| matches!(limbs[joint], Limb::Torso | Limb::Head);
     let mut segments = Vec::new();
     let mut widths: Vec<f64> = vec![TRUNK_M / WIDTH.inside_m; points.len()];

@@ -75,7 +75,7 @@ impl Misalignment {
     /// Indices of the DOFs that move misaligned limbs: their own, and the twist of the limb above, which only shows in them; all
     /// DOFs if the torso is misaligned.
     pub fn dofs(&self, model: &BodyModel) -> Vec<usize> {
-        let of_joints = Limb::of_joints(model.rig());
+        let of_joints = Limb::for_joints(model.rig());
         let is_misaligned = |limb: Limb| self.limbs[position(limb)].is_misaligned;
         let all = model.rig().dofs().iter().enumerate();
         let is_wanted = |(d, dof): &(usize, &body::Dof)| {

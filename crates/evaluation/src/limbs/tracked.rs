@@ -39,10 +39,11 @@ impl Tracked {
         let bones = rig_joints(model, LIMBS[index].1)?;
         let [base, inner, end] = bones.map(|joint| shape.joints[joint]);
         let dofs = model.rig().dofs();
-        let of_joint = |joint: usize| dofs.iter().filter(move |dof| dof.joint == joint);
+        let joint_dofs = |joint: usize| dofs.iter().filter(move |dof| dof.joint == joint);
         // the rig's last rotation at the base is about the bone, the only one of the inner joint is its hinge
         let missing = Error::MissingJoint { name: LIMBS[index].1[1] };
-        let (twist, hinge) = of_joint(bones[0]).next_back().zip(of_joint(bones[1]).next()).ok_or(missing)?;
+        let (twist, hinge) =
+            joint_dofs(bones[0]).next_back().zip(joint_dofs(bones[1]).next()).ok_or(missing)?;
         let free = [f64::NEG_INFINITY, f64::INFINITY];
         let limits = |dof: &body::Dof| dof.limits.filter(|_| method.has_limits).unwrap_or(free);
         let limb = Limb::new(&Build {

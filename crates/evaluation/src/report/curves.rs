@@ -32,7 +32,7 @@ pub fn around_gap(name: String, trials: &[(&[f64], &Gap)]) -> Series {
 }
 
 /// One trial's errors by frame; of a long one means and quartiles over pieces. x is in seconds.
-pub fn of_one(name: String, errors: &[f64]) -> Series {
+pub fn from_errors(name: String, errors: &[f64]) -> Series {
     let step = errors.len().div_ceil(MAX_PLACES).max(1);
     let places = errors
         .chunks(step)
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn a_long_trial_is_drawn_in_pieces() {
         let errors: Vec<f64> = (0..100_000).map(f64::from).collect();
-        let series = of_one("x".to_owned(), &errors);
+        let series = from_errors("x".to_owned(), &errors);
         assert!(series.places.len() <= MAX_PLACES && series.places.len() > MAX_PLACES / 2);
         let first = series.places[0];
         assert!(first.low < first.mean && first.mean < first.high);

@@ -7,7 +7,7 @@ mod run;
 mod sparse;
 
 pub use page::About;
-pub use run::{errors_of_one, run_report};
+pub use run::{run_errors, run_report};
 pub use sparse::sparse_report;
 
 /// What the numbers mean, for who reads a report without this documentation.

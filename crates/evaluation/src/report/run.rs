@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Errors of one motion as a table: a line for each measure.
-pub fn errors_of_one(comparison: &Comparison, slide: Option<&FootSlide>) -> Table {
+pub fn run_errors(comparison: &Comparison, slide: Option<&FootSlide>) -> Table {
     let e = comparison.errors;
     let mut table = Table::new("Errors", String::new(), 1, ["measure", "value"]);
     let mut line = |name: &str, value: f64, decimals| {
@@ -30,7 +30,7 @@ pub fn errors_of_one(comparison: &Comparison, slide: Option<&FootSlide>) -> Tabl
 
 /// The report of one motion beside the truth.
 pub fn run_report(about: &About, comparison: &Comparison, slide: Option<&FootSlide>) -> String {
-    let degrees = curves::of_one("joint angles, RMS".to_owned(), &comparison.frame_rms_deg);
+    let degrees = curves::from_errors("joint angles, RMS".to_owned(), &comparison.frame_rms_deg);
     let plot = LinePlot {
         caption: "Root mean square over the joint angles of each frame. Of a long motion, mean and quartiles over short pieces.",
         x_label: "time, seconds",
@@ -38,7 +38,7 @@ pub fn run_report(about: &About, comparison: &Comparison, slide: Option<&FootSli
         series: &[degrees],
         shaded: None,
     };
-    let centimetres = curves::of_one("joint positions, MPJPE".to_owned(), &comparison.frame_mpjpe_cm);
+    let centimetres = curves::from_errors("joint positions, MPJPE".to_owned(), &comparison.frame_mpjpe_cm);
     let positions = LinePlot {
         caption: "Mean distance of joints and bone ends from their true places.",
         y_label: "cm",
@@ -54,7 +54,7 @@ pub fn run_report(about: &About, comparison: &Comparison, slide: Option<&FootSli
     page(
         about,
         &[
-            table_section(&errors_of_one(comparison, slide)),
+            table_section(&run_errors(comparison, slide)),
             section("Error over time", "", &(plot.figure() + &positions.figure())),
             section("Joints", "", &bars.figure()),
             section("Reading the numbers", READING, ""),

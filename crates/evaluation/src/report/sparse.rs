@@ -42,13 +42,13 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    fn of_case(&self, case: &Case) -> Vec<&'a TrialResult> {
+    fn for_case(&self, case: &Case) -> Vec<&'a TrialResult> {
         self.results.iter().filter(|r| r.case == *case).collect()
     }
 
     fn curve(&self, name: String, case: &Case) -> Option<Series> {
         let trials: Vec<&[f64]> =
-            self.of_case(case).iter().map(|r| &r.comparison.frame_rms_deg[..]).collect();
+            self.for_case(case).iter().map(|r| &r.comparison.frame_rms_deg[..]).collect();
         (!trials.is_empty()).then(|| curves::over_time(name, &trials))
     }
 
@@ -137,8 +137,8 @@ impl<'a> View<'a> {
         });
         let mut figures = String::new();
         for (name, case) in cases.iter().filter(|(_, case)| case.occlusion.is_some()) {
-            let hidden: Vec<&TrialResult> = self.of_case(case);
-            let whole = self.of_case(&self.reference);
+            let hidden: Vec<&TrialResult> = self.for_case(case);
+            let whole = self.for_case(&self.reference);
             let mut series = [Vec::new(), Vec::new()];
             for result in &hidden {
                 let Some(gap) = &result.gap else { continue };
@@ -175,7 +175,7 @@ impl<'a> View<'a> {
         cases.sort_by_key(|(_, case)| *case != self.reference);
         let groups: Vec<Vec<&Comparison>> = cases
             .iter()
-            .map(|(_, case)| self.of_case(case).into_iter().map(|r| &r.comparison).collect())
+            .map(|(_, case)| self.for_case(case).into_iter().map(|r| &r.comparison).collect())
             .collect();
         let names: Vec<String> = cases.into_iter().map(|(name, _)| name).collect();
         let caption = format!(
@@ -187,7 +187,7 @@ impl<'a> View<'a> {
     }
 
     fn worst(&self) -> String {
-        let mut trials = self.of_case(&self.reference);
+        let mut trials = self.for_case(&self.reference);
         trials.sort_by(|a, b| b.comparison.errors.rms_deg.total_cmp(&a.comparison.errors.rms_deg));
         trials.truncate(WORST);
         let columns =

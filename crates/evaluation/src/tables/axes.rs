@@ -62,7 +62,7 @@ pub struct Axes {
 impl Axes {
     /// Of all rows. The reference has most control points, the first variant, windows of two frames if there are any, the
     /// largest database, least noise, and nothing hidden.
-    pub fn of(rows: &[Row]) -> Option<Self> {
+    pub fn from_rows(rows: &[Row]) -> Option<Self> {
         let first = &rows.first()?.case;
         let cases = || rows.iter().map(|r| &r.case);
         let varied = Axis::ALL.into_iter().filter(|axis| cases().any(|case| !axis.is_equal(case, first)));

@@ -70,9 +70,9 @@ pub fn points(rows: &[Row], axes: &Axes, beside_papers: bool) -> Table {
         let head = |what: &str| vec![Cell::text(method.clone()), Cell::text(what)];
         table.push([head("RMS"), grid.line(group, false, |r| Cell::Number(r.rms_deg, 2))].concat());
         table.push([head("mean absolute"), grid.line(group, false, |r| Cell::Number(r.mae_deg, 2))].concat());
-        let of_paper = |case: &&Case| Cell::maybe(papers::for_points(&method, case.points), 2);
+        let paper_cell = |case: &&Case| Cell::maybe(papers::for_points(&method, case.points), 2);
         if beside_papers && papers::METHODS.contains(&method.as_str()) {
-            table.push([head("paper"), grid.columns.iter().map(of_paper).collect()].concat());
+            table.push([head("paper"), grid.columns.iter().map(paper_cell).collect()].concat());
         }
     }
     table
@@ -98,13 +98,13 @@ pub fn windows(rows: &[Row], axes: &Axes, beside_papers: bool) -> Table {
         let speed = grid.line(group, true, |r| Cell::Number(r.frames_per_second, 0));
         table.push([head("frames/s"), speed].concat());
         if beside_papers && method == papers::METHODS[3] {
-            let of_paper = |decimals, value: fn((f64, f64)) -> f64| {
+            let paper_cell = |decimals, value: fn((f64, f64)) -> f64| {
                 let cell =
                     |c: &&Case| Cell::maybe(papers::for_window(&method, c.window).map(value), decimals);
                 grid.columns.iter().map(cell).collect()
             };
-            table.push([head("paper, degrees"), of_paper(2, |(error, _)| error)].concat());
-            table.push([head("paper, frames/s"), of_paper(0, |(_, speed)| speed)].concat());
+            table.push([head("paper, degrees"), paper_cell(2, |(error, _)| error)].concat());
+            table.push([head("paper, frames/s"), paper_cell(0, |(_, speed)| speed)].concat());
         }
     }
     table

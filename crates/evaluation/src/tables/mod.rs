@@ -15,7 +15,7 @@ use axes::{Axes, Axis};
 /// All tables that the rows give, for reports. `beside_papers`: whether the motion was recorded, so that the papers' figures say something
 /// beside it.
 pub fn tables(rows: &[Row], beside_papers: bool) -> Vec<Table> {
-    let Some(axes) = Axes::of(rows) else { return Vec::new() };
+    let Some(axes) = Axes::from_rows(rows) else { return Vec::new() };
     let mut tables = vec![errors_table(rows)];
     tables.extend(comparison_tables(rows, beside_papers));
     if beside_papers && !axes.varies(Axis::Points) {
@@ -28,12 +28,12 @@ pub fn tables(rows: &[Row], beside_papers: bool) -> Vec<Table> {
 /// The case that others are set beside: most control points, the first method and parameters, windows of two frames if there are any, the
 /// largest database, least noise, nothing hidden.
 pub fn reference(rows: &[Row]) -> Option<Case> {
-    Axes::of(rows).map(|axes| axes.reference)
+    Axes::from_rows(rows).map(|axes| axes.reference)
 }
 
 /// The tables that set cases beside one another and beside the papers, without the table of errors; none for a single case.
 pub fn comparison_tables(rows: &[Row], beside_papers: bool) -> Vec<Table> {
-    let Some(axes) = Axes::of(rows) else { return Vec::new() };
+    let Some(axes) = Axes::from_rows(rows) else { return Vec::new() };
     let mut tables = Vec::new();
     if axes.varies(Axis::Points) {
         tables.push(beside::points(rows, &axes, beside_papers));
@@ -67,7 +67,7 @@ pub fn errors_table(rows: &[Row]) -> Table {
 }
 
 fn errors(rows: &[Row], mean: fn(f64, f64, usize) -> Cell) -> Table {
-    let axes = Axes::of(rows);
+    let axes = Axes::from_rows(rows);
     let varied: Vec<Axis> = [Axis::Window, Axis::Variant, Axis::Database, Axis::Noise, Axis::Gap]
         .into_iter()
         .filter(|axis| axes.as_ref().is_some_and(|axes| axes.varies(*axis)))

@@ -161,8 +161,8 @@ fn performers(args: &Args, folder: &Path) -> anyhow::Result<Vec<Performer>> {
         trials.push(Performer { skeleton_asf: formats::asf::write(clip.motion.skeleton()), frames });
     }
     // Trials of one performer follow one another; another performer's would need another skeleton.
-    let of = |stream: usize| trials[stream % trials.len()].clone();
-    Ok((0..args.streams).map(of).collect())
+    let performer = |stream: usize| trials[stream % trials.len()].clone();
+    Ok((0..args.streams).map(performer).collect())
 }
 
 fn trials(count: u32, seed: u64) -> Trials {
@@ -207,9 +207,9 @@ async fn stream_all(
         .collect();
     let (mut latencies, mut dropped) = (Vec::new(), 0);
     for task in tasks {
-        let (seconds, of_stream) = task.await??;
+        let (seconds, lost) = task.await??;
         latencies.extend(seconds);
-        dropped += of_stream;
+        dropped += lost;
     }
     Ok(Latency::of(latencies, count * number as u64, dropped))
 }

@@ -78,7 +78,7 @@ struct Time {
 }
 
 impl Time {
-    fn of(mut seconds: Vec<f64>) -> Self {
+    fn from_seconds(mut seconds: Vec<f64>) -> Self {
         seconds.sort_by(f64::total_cmp);
         let mean = seconds.iter().sum::<f64>() / seconds.len().max(1) as f64;
         let median = seconds.get(seconds.len() / 2).copied().unwrap_or(0.0);
@@ -180,8 +180,9 @@ impl Watch {
     }
 
     fn row(self, window: u8) -> Row {
-        let stage = |slot: usize| Time::of(self.steady.iter().map(|(_, stages)| stages[slot]).collect());
-        let frame = Time::of(self.steady.iter().map(|(whole, _)| *whole).collect());
+        let stage =
+            |slot: usize| Time::from_seconds(self.steady.iter().map(|(_, stages)| stages[slot]).collect());
+        let frame = Time::from_seconds(self.steady.iter().map(|(whole, _)| *whole).collect());
         let seconds = self.steady.iter().map(|(whole, _)| whole).chain(&self.starts).sum::<f64>();
         let [query, search, prior, map, rest] = [0, 1, 2, 3, 4].map(stage);
         Row {
@@ -197,7 +198,7 @@ impl Watch {
             map,
             rest,
             starts: self.starts.len(),
-            start: Time::of(self.starts),
+            start: Time::from_seconds(self.starts),
         }
     }
 }

@@ -118,7 +118,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let verify_s = begin.elapsed().as_secs_f64();
     let Some(index) = opened.windows() else { bail!("the index file has no windows") };
 
-    let runs = queries.iter().filter_map(|clip| Run::of(clip, opened.database(), index, args.frames));
+    let runs = queries.iter().filter_map(|clip| Run::from_clip(clip, opened.database(), index, args.frames));
     let runs: Vec<Run> = runs.collect();
     let mut query_performers: Vec<String> = performers.iter().map(|s| (*s).to_owned()).collect();
     query_performers.sort_unstable();

@@ -5,7 +5,7 @@ use std::{fs, path::PathBuf};
 use anyhow::{Context, bail};
 use evaluation::{
     Comparison, ContactThresholds, FootPaths, FootSlide, at_60_hz, compare_in_detail, foot_slide,
-    report::{About, errors_of_one, run_report},
+    report::{About, run_errors, run_report},
 };
 use formats::BvhOptions;
 use kinematics::{Parametrisation, References};
@@ -117,10 +117,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let rest = References::rest(truth.skeleton());
     let truth = at_60_hz(&Parametrisation::smooth(truth.skeleton(), &rest)?, &truth, usize::MAX)?;
     let comparison = compare_in_detail(&truth, &found);
-    let slide = FootPaths::of(&truth)
-        .zip(FootPaths::of(&found))
+    let slide = FootPaths::from_motion(&truth)
+        .zip(FootPaths::from_motion(&found))
         .and_then(|(truth, found)| foot_slide(&truth, &found, &ContactThresholds::default()));
-    let table = errors_of_one(&comparison, slide.as_ref());
+    let table = run_errors(&comparison, slide.as_ref());
     println!("run {} beside {name}\n{}", run.id, table.text().trim_end());
     if truth.num_frames() != found.num_frames() {
         println!(

@@ -14,7 +14,12 @@ impl Run {
     }
 
     /// The queries of up to `frames` frames from the middle of a clip; `None` if the clip is too short for any.
-    pub fn of(clip: &Clip, database: &MotionDatabase, index: &WindowIndex, frames: usize) -> Option<Self> {
+    pub fn from_clip(
+        clip: &Clip,
+        database: &MotionDatabase,
+        index: &WindowIndex,
+        frames: usize,
+    ) -> Option<Self> {
         let dofs = database.num_dofs();
         let scale = database.leg_length() / SkeletonSize::leg_length(clip.motion.skeleton());
         let mut coordinates = resample(&clip.motion, database.parametrisation());

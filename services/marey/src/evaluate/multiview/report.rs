@@ -112,7 +112,7 @@ pub struct Report {
 }
 
 fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
-    Distribution::of(numbers).map(|numbers| numbers.mean)
+    Distribution::from_figures(numbers).map(|numbers| numbers.mean)
 }
 
 fn baseline(
@@ -132,8 +132,8 @@ fn baseline(
 impl Report {
     pub fn new(joints: Joints, frames: Vec<FrameReport>, times: &Times, settings: Settings) -> Self {
         let all = |frame: &FrameReport| frame.prepare_ms + frame.track_ms;
-        let of = |stage: &'static str| frames.iter().filter(move |frame| frame.stage == stage);
-        let local_ms = Distribution::of(of("local").map(all));
+        let at_stage = |stage: &'static str| frames.iter().filter(move |frame| frame.stage == stage);
+        let local_ms = Distribution::from_figures(at_stage("local").map(all));
         let searched: Vec<f64> = frames
             .iter()
             .filter(|frame| frame.effective_sample_size.is_some())
@@ -144,7 +144,7 @@ impl Report {
         Self {
             joint_mean_mm: own.joint_mean_mm,
             joint_max_mm: own.joint_max_mm,
-            misaligned_frames: of("misaligned").count(),
+            misaligned_frames: at_stage("misaligned").count(),
             iou_mean: own.iou_mean.unwrap_or_default(),
             local_ms_per_frame: local_ms.map(|local| local.mean),
             global_ms_per_frame: mean(times.search_ms.iter().copied()),
@@ -153,15 +153,15 @@ impl Report {
             frames_lost: own.frames_lost,
             joints_left_out: joints.left_out,
             stages: Stages {
-                local: of("local").count(),
-                particles: of("particles").count(),
-                misaligned: of("misaligned").count(),
-                unseen: of("unseen").count(),
+                local: at_stage("local").count(),
+                particles: at_stage("particles").count(),
+                misaligned: at_stage("misaligned").count(),
+                unseen: at_stage("unseen").count(),
             },
             local_ms,
-            prepare_ms: Distribution::of(frames.iter().map(|frame| frame.prepare_ms)),
-            search_ms: Distribution::of(times.search_ms.iter().copied()),
-            features_ms: Distribution::of(times.features_ms.iter().copied()),
+            prepare_ms: Distribution::from_figures(frames.iter().map(|frame| frame.prepare_ms)),
+            search_ms: Distribution::from_figures(times.search_ms.iter().copied()),
+            features_ms: Distribution::from_figures(times.features_ms.iter().copied()),
             matches: times.matches,
             initialisation_s: times.start_s,
             local_only: baseline(&frames, |frame| &frame.local_only, alone),

@@ -54,8 +54,8 @@ struct Claim {
 }
 
 impl Claim {
-    fn of(pairs: impl IntoIterator<Item = (bool, bool)>) -> Self {
-        let difference = PairedDifference::of(pairs);
+    fn from_pairs(pairs: impl IntoIterator<Item = (bool, bool)>) -> Self {
+        let difference = PairedDifference::from_pairs(pairs);
         Self { difference, verdict: difference.verdict(MARGIN) }
     }
 
@@ -86,32 +86,32 @@ impl Cell {
         methods: &[Method<'_>],
         recovered: Vec<Vec<Recovered>>,
     ) -> Self {
-        let of = |method: &Method<'_>, recovered: &Vec<Recovered>| MethodCell {
+        let cell = |method: &Method<'_>, recovered: &Vec<Recovered>| MethodCell {
             name: method.name,
             evaluations: method.evaluations(),
             search: matches!(method.way, Way::Search(_))
-                .then(|| Proportion::of(recovered.iter().map(Recovered::is_found_by_search))),
-            found: Proportion::of(recovered.iter().map(Recovered::is_found)),
+                .then(|| Proportion::from_tries(recovered.iter().map(Recovered::is_found_by_search))),
+            found: Proportion::from_tries(recovered.iter().map(Recovered::is_found)),
             searched_m: recovered.iter().map(|start| start.searched_m).collect(),
             final_m: recovered.iter().map(|start| start.final_m).collect(),
         };
         let methods: Vec<_> =
-            methods.iter().zip(&recovered).map(|(method, found)| of(method, found)).collect();
-        let claim = [0, 1].map(|end| Claim::of(pairs(&methods, end)));
+            methods.iter().zip(&recovered).map(|(method, found)| cell(method, found)).collect();
+        let claim = [0, 1].map(|end| Claim::from_pairs(pairs(&methods, end)));
         let start = methods.first().map_or(&[][..], |local| &local.searched_m);
-        let disturbed = Proportion::of(start.iter().map(|&metres| metres <= FOUND_M));
+        let disturbed = Proportion::from_tries(start.iter().map(|&metres| metres <= FOUND_M));
         Self { limbs, turned_deg, disturbed, methods, claim }
     }
 }
 
 /// Whether each start was found by the two searches of the claim: alone, or (`end` = 1) after local optimisation.
 fn pairs(methods: &[MethodCell], end: usize) -> Vec<(bool, bool)> {
-    let of = |name: &str| {
+    let is_found = |name: &str| {
         let method = methods.iter().find(|method| method.name == name);
         let metres = method.map_or(&[][..], |m| if end == 0 { &m.searched_m } else { &m.final_m });
         metres.iter().map(|&metres| metres <= FOUND_M).collect::<Vec<_>>()
     };
-    of(WITH_PRIOR).into_iter().zip(of(LARGE_WITHOUT)).collect()
+    is_found(WITH_PRIOR).into_iter().zip(is_found(LARGE_WITHOUT)).collect()
 }
 
 /// Percent with the interval.
@@ -125,7 +125,7 @@ pub fn table(cells: &[Cell], note: String) -> Table {
     let columns = ["limbs", "turned", "method", "search alone, %", "then locally, %", "energies"];
     let text = format!(
         "{note}. Percent of {} starts with all joints within {:.0} mm, with 95 % intervals (Wilson); the same starts in every line.",
-        cells.first().map_or(0, |cell| cell.disturbed.of),
+        cells.first().map_or(0, |cell| cell.disturbed.tries),
         1000.0 * FOUND_M
     );
     let mut table = Table::new("Recovery", text, 5, columns);
@@ -161,7 +161,7 @@ pub fn print_claim(cells: &[Cell]) {
     for cell in cells {
         line(cell.limbs, format!("{}°", cell.turned_deg), &cell.claim);
     }
-    let all = |end| Claim::of(cells.iter().flat_map(|cell| pairs(&cell.methods, end)));
+    let all = |end| Claim::from_pairs(cells.iter().flat_map(|cell| pairs(&cell.methods, end)));
     if cells.len() > 1 {
         line("all", String::new(), &[all(0), all(1)]);
     }

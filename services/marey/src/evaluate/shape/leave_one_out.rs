@@ -129,8 +129,8 @@ pub fn run(folder: &Path, args: &Args) -> anyhow::Result<()> {
 }
 
 fn report(cases: &[Case], people: usize, views: usize, args: &Args) -> anyhow::Result<()> {
-    let all = Summary::of(cases.iter());
-    let base_pose = Summary::of(cases.iter().filter(|case| case.pose.contains(BASE)));
+    let all = Summary::from_cases(cases.iter());
+    let base_pose = Summary::from_cases(cases.iter().filter(|case| case.pose.contains(BASE)));
     println!("{:<28}{:>8}{:>8}{:>8}{:>8}", "", "median", "mean", "90 %", "max");
     for (name, summary) in [("all poses", &all), ("base pose", &base_pose)] {
         let row = |figure: &str, found: Option<Distribution>| {
@@ -163,9 +163,9 @@ fn report(cases: &[Case], people: usize, views: usize, args: &Args) -> anyhow::R
 }
 
 impl Summary {
-    fn of<'a>(cases: impl Iterator<Item = &'a Case> + Clone) -> Self {
+    fn from_cases<'a>(cases: impl Iterator<Item = &'a Case> + Clone) -> Self {
         let figure = |pick: fn(&ShapeErrors) -> f64| {
-            Distribution::of(cases.clone().filter_map(|case| case.errors.as_ref().map(pick)))
+            Distribution::from_figures(cases.clone().filter_map(|case| case.errors.as_ref().map(pick)))
         };
         let is_found = |case: &&Case| case.errors.as_ref().is_some_and(|e| e.joint_mean_mm < 1e3 * FOUND_M);
         let count = cases.clone().count();
@@ -174,7 +174,7 @@ impl Summary {
             surface_std_mm: figure(|e| e.surface_std_mm),
             joint_mean_mm: figure(|e| e.joint_mean_mm),
             stature_error_mm: figure(|e| e.stature_error_mm.abs()),
-            seconds: Distribution::of(cases.clone().map(|case| case.seconds)),
+            seconds: Distribution::from_figures(cases.clone().map(|case| case.seconds)),
             found: cases.filter(is_found).count() as f64 / count.max(1) as f64,
         }
     }
