@@ -8,14 +8,11 @@ use std::{
 use ::body::{BodyModel, LearnOptions, Sex, Wanted};
 use anyhow::{Context, bail};
 use body::{ScanOptions, ScanSet, shipped};
+use client::{Client, Run, ServerArgs, encode};
 use formats::archive::{self, Entry, Limits};
 use serde_json::{Value, json};
 
-use crate::{
-    cli::ServerArgs,
-    client::{Client, Run, encode},
-    pack, watch,
-};
+use crate::{pack, watch};
 
 /// `marey body …`
 #[derive(Debug, clap::Subcommand)]

@@ -1,10 +1,11 @@
 //! The command line, as `marey --help` tells it.
 
 use clap::{Parser, Subcommand};
+use evaluation_commands::{bench, evaluate};
 
 use crate::{
-    bench, body, cmu, connection::Server, database, demo, evaluate, health, keys, live, marker_sets, results,
-    run, sample, sample_capture, serve, status, up, upload,
+    body, cmu, database, demo, health, keys, live, marker_sets, results, run, sample, sample_capture, serve,
+    status, up, upload,
 };
 
 /// Full-body motion from a few control points.
@@ -100,27 +101,6 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Migrate(args) => keys::migrate(&args),
         Command::Key(command) => keys::run(&command),
         Command::Health(args) => health::run(&args),
-    }
-}
-
-/// The server to talk to, and the client for it.
-#[derive(Debug, clap::Args)]
-pub struct ServerArgs {
-    /// Server to talk to, such as http://127.0.0.1:8080; else the one that `marey up` started here
-    #[arg(long, env = "MAREY_URL", global = true, help_heading = "Server")]
-    url: Option<String>,
-    /// Key to the server's project
-    #[arg(long, env = "MAREY_API_KEY", global = true, hide_env_values = true, help_heading = "Server")]
-    api_key: Option<String>,
-}
-
-impl ServerArgs {
-    /// The server meant.
-    ///
-    /// # Errors
-    /// If none is named and none was started here.
-    pub fn server(&self) -> anyhow::Result<Server> {
-        Server::find(self.url.clone(), self.api_key.clone())
     }
 }
 

@@ -3,13 +3,10 @@
 use std::path::PathBuf;
 
 use anyhow::bail;
+use client::{Client, MotionDatabase, Run, ServerArgs, encode};
 use serde_json::{Map, Value, json};
 
-use crate::{
-    cli::ServerArgs,
-    client::{Client, MotionDatabase, Run, encode},
-    database_show, pack, watch,
-};
+use crate::{database_show, pack, watch};
 
 /// `marey db …`
 #[derive(Debug, clap::Subcommand)]

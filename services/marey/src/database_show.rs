@@ -2,9 +2,8 @@
 
 use std::fmt::Write;
 
+use client::MotionDatabase;
 use serde::Deserialize;
-
-use crate::client::MotionDatabase;
 
 /// A motion database and what is in it.
 #[derive(Debug, Deserialize)]

@@ -10,11 +10,11 @@ use std::{
 };
 
 use anyhow::{Context, bail};
+use client::{Client, MotionDatabase, Run, Session};
 use serde_json::{Value, json};
 use service::config::{TelemetryConfig, Variables, environment};
 
 use crate::{
-    client::{Client, MotionDatabase, Run, Session},
     database, results,
     sample::Trials,
     serve::runtime,

@@ -1,10 +1,11 @@
 //! `marey migrate` and `marey key`: what is done on the database itself.
 
 use anyhow::Context;
+use client::Server;
 use gateway::access::{self, Scope};
 use sqlx::{Connection, PgConnection};
 
-use crate::{connection::Server, serve::runtime};
+use crate::serve::runtime;
 
 /// Bring a database's schema up to date
 #[derive(Debug, clap::Args)]

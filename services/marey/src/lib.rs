@@ -2,16 +2,12 @@
 //!
 //! The program is a library so that tests can start it as a process of its own.
 
-mod bench;
 mod body;
 mod cli;
-mod client;
 mod cmu;
-mod connection;
 mod database;
 mod database_show;
 mod demo;
-mod evaluate;
 mod health;
 mod keys;
 mod live;

@@ -1,6 +1,5 @@
 //! `marey live`: points as they are measured go to the server, poses come back.
 
-mod connection;
 mod source;
 
 use std::{
@@ -16,9 +15,13 @@ use serde_json::{Value, json};
 use tokio::time::{Interval, MissedTickBehavior, timeout_at};
 use tokio_util::sync::CancellationToken;
 
-pub use self::connection::{Connection, frame_message};
-use self::connection::{Lost, Sender};
-use crate::{cli::ServerArgs, connection::Server, serve::runtime};
+use client::{
+    Latency, Server, ServerArgs,
+    live::{Connection, Lost, Sender, frame_message},
+    parameters::values,
+};
+
+use crate::serve::runtime;
 use source::Source;
 
 /// After a connection was lost: from the first attempt to the next one, doubled up to the longest wait.
@@ -91,11 +94,6 @@ fn start(args: &Args, points: &[String]) -> anyhow::Result<Value> {
     Ok(start)
 }
 
-/// `NAME=VALUE` options as parameters: numbers and true where they read as such, else words.
-pub fn values(options: &[String]) -> anyhow::Result<Value> {
-    crate::run::pairs(options, |v| serde_json::from_str(v).unwrap_or_else(|_| v.into()))
-}
-
 /// Follows the performer to the end of the frames, over as many connections as it takes.
 async fn follow(args: &Args, server: &Server, source: Source, mut start: Value) -> anyhow::Result<()> {
     let opened = Connection::open(server, &args.database, &start).await;
@@ -142,7 +140,7 @@ async fn follow(args: &Args, server: &Server, source: Source, mut start: Value) 
         let from = if start["state"].is_null() { "anew" } else { "from the last state" };
         eprintln!("marey: connected again; going on {from} with frame {}", feed.frame + 1);
     }
-    eprintln!("{}", Latency::of(answers.latencies, feed.frame, answers.dropped));
+    eprintln!("{}", Latency::from_seconds(answers.latencies, feed.frame, answers.dropped));
     Ok(())
 }
 
@@ -298,48 +296,6 @@ async fn send(mut feed: Feed, mut sender: Sender, over: CancellationToken) -> an
     Ok(feed)
 }
 
-/// How long poses took, from sending the frame to having the pose.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Latency {
-    /// frames sent
-    pub frames: u64,
-    /// frames without a pose, as the server counted them
-    pub dropped: u64,
-    /// sorted, seconds
-    sorted: Vec<f64>,
-}
-
-impl Latency {
-    /// Of poses that took so many seconds.
-    pub fn of(mut seconds: Vec<f64>, frames: u64, dropped: u64) -> Self {
-        seconds.sort_by(f64::total_cmp);
-        Self { frames, dropped, sorted: seconds }
-    }
-
-    /// The time, in milliseconds, within which this share of the poses came.
-    pub fn quantile_ms(&self, share: f64) -> f64 {
-        let last = self.sorted.len().saturating_sub(1);
-        let at = ((self.sorted.len() as f64 * share).ceil() as usize).saturating_sub(1).min(last);
-        self.sorted.get(at).map_or(f64::NAN, |seconds| seconds * 1000.0)
-    }
-}
-
-impl std::fmt::Display for Latency {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "{} frames, {} poses, {} dropped; latency p50 {:.2} ms, p95 {:.2} ms, p99 {:.2} ms, max {:.2} ms",
-            self.frames,
-            self.sorted.len(),
-            self.dropped,
-            self.quantile_ms(0.5),
-            self.quantile_ms(0.95),
-            self.quantile_ms(0.99),
-            self.quantile_ms(1.0),
-        )
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -348,15 +304,6 @@ mod tests {
         Message,
         protocol::{CloseFrame, frame::coding::CloseCode},
     };
-
-    #[test]
-    fn quantiles_are_those_of_the_nearest_rank() {
-        let latency = Latency::of((1..=200).rev().map(|i| f64::from(i) / 1000.0).collect(), 200, 0);
-        for (share, expected) in [(0.5, 100.0), (0.95, 190.0), (0.99, 198.0), (1.0, 200.0)] {
-            assert!((latency.quantile_ms(share) - expected).abs() < 1e-9);
-        }
-        assert!(Latency::of(vec![], 0, 0).quantile_ms(0.5).is_nan());
-    }
 
     #[test]
     fn a_state_file_is_replaced_as_a_whole() {

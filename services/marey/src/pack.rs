@@ -6,9 +6,9 @@ use std::{
 };
 
 use anyhow::{Context, bail};
+use formats::motion_files::is_motion_file;
 
 const ARCHIVES: [&str; 6] = [".zip", ".tar", ".tar.gz", ".tgz", ".tar.zst", ".tzst"];
-const MOTION_FILES: [&str; 3] = [".asf", ".amc", ".bvh"];
 
 /// Motions are uploaded in pieces of so many bytes: a server takes 512 MiB, and reads pieces one after the other.
 const PIECE_BYTES: u64 = 128 << 20;
@@ -103,11 +103,6 @@ fn common_folder(files: &[PathBuf]) -> PathBuf {
         .find(|above| folders().all(|folder| folder.starts_with(above)))
         .unwrap_or(Path::new(""))
         .to_owned()
-}
-
-/// Whether a file holds motion or a skeleton by its name, or says more of those beside it.
-pub fn is_motion_file(name: &str) -> bool {
-    name.eq_ignore_ascii_case("index.csv") || has_extension(without_compression(name), &MOTION_FILES)
 }
 
 fn without_compression(name: &str) -> &str {

@@ -6,11 +6,7 @@ use std::{
 };
 
 use anyhow::Context;
-
-use crate::{
-    cli::ServerArgs,
-    client::{Client, ResultFile, encode},
-};
+use client::{Client, ResultFile, ServerArgs, encode};
 
 /// Download what a run has made
 #[derive(Debug, clap::Args)]

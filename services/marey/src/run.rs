@@ -1,13 +1,13 @@
 //! `marey run`.
 
 use anyhow::Context;
+use client::{
+    Client, Run, ServerArgs,
+    parameters::{pairs, values},
+};
 use serde_json::{Map, Value, json};
 
-use crate::{
-    cli::ServerArgs,
-    client::{Client, Run},
-    marker_sets, watch,
-};
+use crate::{marker_sets, watch};
 
 /// Reconstruct a session: motion from control points, or a body and its motion from what cameras saw
 #[derive(Debug, clap::Args)]
@@ -182,9 +182,7 @@ fn request(args: &Args) -> anyhow::Result<Value> {
         (
             "parameters",
             // a number or true where it reads as one, else a word
-            (!args.parameters.is_empty())
-                .then(|| pairs(&args.parameters, |v| serde_json::from_str(v).unwrap_or_else(|_| v.into())))
-                .transpose()?,
+            (!args.parameters.is_empty()).then(|| values(&args.parameters)).transpose()?,
         ),
     ];
     for (name, value) in marker_sets::request(&args.mapping)? {
@@ -196,17 +194,4 @@ fn request(args: &Args) -> anyhow::Result<Value> {
         }
     }
     Ok(request)
-}
-
-/// What `NAME=VALUE` options say.
-pub fn pairs(given: &[String], value: impl Fn(&str) -> Value) -> anyhow::Result<Value> {
-    given
-        .iter()
-        .map(|pair| {
-            let (name, text) =
-                pair.split_once('=').with_context(|| format!("{pair:?} is not of the form NAME=VALUE"))?;
-            Ok((name.trim().to_owned(), value(text.trim())))
-        })
-        .collect::<anyhow::Result<Map<_, _>>>()
-        .map(Value::Object)
 }

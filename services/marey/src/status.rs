@@ -1,12 +1,9 @@
 //! `marey status` and `marey cancel`.
 
+use client::{Client, Page, Run, ServerArgs, encode};
 use serde_json::json;
 
-use crate::{
-    cli::ServerArgs,
-    client::{Client, Page, Run, encode},
-    watch,
-};
+use crate::watch;
 
 /// Show runs and how far they are
 #[derive(Debug, clap::Args)]

@@ -7,6 +7,7 @@ use std::{
 };
 
 use anyhow::Context;
+use client::{DEFAULT_DATA_DIR, Server};
 use gateway::{
     Gateway,
     access::{self, Scope},
@@ -17,10 +18,7 @@ use sqlx::{Connection, PgConnection};
 use store::Location;
 use tokio_util::sync::CancellationToken;
 
-use crate::{
-    connection::{DEFAULT_DATA_DIR, Server},
-    serve::runtime,
-};
+use crate::serve::runtime;
 
 /// Running jobs get so long to end after Ctrl-C, before they are handed back to be done again.
 const GRACE: Duration = Duration::from_secs(5);
@@ -182,7 +180,7 @@ async fn start_services(
 /// The key of earlier times, or a new one.
 async fn api_key(data_dir: &Path, database_url: &str) -> anyhow::Result<String> {
     let mut db = PgConnection::connect(database_url).await?;
-    if let Some(server) = Server::of_data_dir(data_dir)?
+    if let Some(server) = Server::in_data_dir(data_dir)?
         && access::is_known(&mut db, &server.api_key).await?
     {
         return Ok(server.api_key);

@@ -3,12 +3,9 @@
 use std::{fs::File, path::PathBuf};
 
 use anyhow::Context;
+use client::{Client, ServerArgs, Session, encode};
 
-use crate::{
-    cli::ServerArgs,
-    client::{Client, Session, encode},
-    session_files,
-};
+use crate::session_files;
 
 /// Upload the files of a session: control points, skeleton, true motion; or calibration, videos, masks, plates
 ///

@@ -6,10 +6,9 @@ use std::{
 };
 
 use anyhow::bail;
+use client::Client;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Deserialize;
-
-use crate::client::Client;
 
 /// Between two tries to connect.
 const RETRY: Duration = Duration::from_secs(1);

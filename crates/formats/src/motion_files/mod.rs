@@ -54,6 +54,15 @@ pub struct MotionFile {
     pub motion: Motion,
 }
 
+/// Whether a file of that name is one that [`clips`] makes something of: motion, a skeleton or an index, also packed by
+/// Zstandard or gzip.
+pub fn is_motion_file(name: &str) -> bool {
+    let unpacked =
+        name.strip_suffix(".zst").or(name.strip_suffix(".gz")).unwrap_or(name).to_ascii_lowercase();
+    name.eq_ignore_ascii_case("index.csv")
+        || [".asf", ".amc", ".bvh"].iter().any(|end| unpacked.ends_with(end))
+}
+
 /// The motions of all AMC and BVH files, in the order of their paths.
 ///
 /// An AMC file belongs to the ASF file whose name is the longest beginning of its own up to a `_` (`16_15.amc` to

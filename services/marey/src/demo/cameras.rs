@@ -3,6 +3,7 @@
 use std::{fs, path::Path};
 
 use anyhow::Context;
+use client::{Client, Run};
 use formats::points_csv;
 use model::PointTrajectories;
 use nalgebra::Vector3;
@@ -11,12 +12,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::{remove, step};
-use crate::{
-    client::{Client, Run},
-    results,
-    sample_capture::SampleCapture,
-    session_files, upload, watch,
-};
+use crate::{results, sample_capture::SampleCapture, session_files, upload, watch};
 
 /// Folder of the results.
 pub const FOLDER: &str = "walk-6-cameras";

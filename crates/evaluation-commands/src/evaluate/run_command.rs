@@ -3,6 +3,7 @@
 use std::{fs, path::PathBuf};
 
 use anyhow::{Context, bail};
+use client::{Client, ResultFile, ServerArgs, encode};
 use evaluation::{
     Comparison, ContactThresholds, FootPaths, FootSlide, at_60_hz, compare_in_detail, foot_slide,
     report::{About, run_errors, run_report},
@@ -16,10 +17,6 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use super::written::{command, write};
-use crate::{
-    cli::ServerArgs,
-    client::{Client, ResultFile, encode},
-};
 
 /// Most bytes of an unpacked file.
 const MAX_BYTES: u64 = 2 << 30;

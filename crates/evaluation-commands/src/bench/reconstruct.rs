@@ -14,7 +14,7 @@ use motion_db::{Clip, MotionDatabase, WindowIndex, trial_of};
 use serde::Serialize;
 use sparse::{Parameters, Reconstructor, Session, Stage, control_points};
 
-use crate::evaluate::motions;
+use crate::motions;
 
 /// Frames a second that the Chinese paper prints for windows of 1 to 4 frames (table 1; one core of 2.8 GHz).
 const PAPER: [f64; 4] = [84.0, 59.0, 34.0, 20.0];

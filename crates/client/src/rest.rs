@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use ureq::{Agent, Body, http::Response};
 
-use crate::connection::Server;
+use crate::Server;
 
 /// Talks to one server with one key.
 #[derive(Debug, Clone)]

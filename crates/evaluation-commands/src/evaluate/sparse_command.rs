@@ -7,10 +7,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use motion_db::{Augment, Clip};
 
 use super::{
-    motions,
     sweep::SweepArgs,
     written::{Outcome, Written},
 };
+use crate::motions;
 
 /// Every n-th trial, in the order of names, is for tuning; the others are for reporting.
 const TUNING_STEP: usize = 3;

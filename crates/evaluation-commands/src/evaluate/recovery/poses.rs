@@ -9,7 +9,7 @@ use evaluation::training_poses::{covering, recorded_poses, training_poses};
 use motion_db::Clip;
 use sample_motion::{Action, DrawOptions, Model};
 
-use crate::evaluate::motions;
+use crate::motions;
 
 /// Poses of a prior.
 pub(in crate::evaluate) const TRAINING_POSES: usize = 100;

@@ -11,8 +11,8 @@ use serde::Serialize;
 use skeleton_fit::FitSettings;
 use sparse::Parameters;
 
-use super::motions;
 use super::sparse_command::{Part, chosen};
+use crate::motions;
 
 /// What both evaluations take.
 #[derive(Debug, clap::Args)]

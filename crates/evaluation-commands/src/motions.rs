@@ -9,11 +9,9 @@ use std::{
 use anyhow::{Context, bail};
 use formats::{
     archive::{self, Entry, Limits},
-    motion_files::{self, Options},
+    motion_files::{self, Options, is_motion_file},
 };
 use motion_db::Clip;
-
-use crate::pack::is_motion_file;
 
 /// Reads the motions of folders (ASF+AMC or BVH, also `.zst` or `.gz`), in the order of their names.
 pub fn read(folders: &[PathBuf]) -> anyhow::Result<Vec<Clip>> {

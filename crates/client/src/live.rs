@@ -19,7 +19,7 @@ use tokio_tungstenite::{
     },
 };
 
-use crate::{client::encode, connection::Server};
+use crate::{Server, encode};
 
 /// The server pings every 15 s: when nothing comes for so long it is gone.
 const SILENCE: Duration = Duration::from_secs(50);
@@ -146,7 +146,7 @@ impl Receiver {
     /// What the server has against the stream; [`Lost`] if that may pass.
     pub fn end(self) -> anyhow::Result<()> {
         let (code, reason) = self.closed;
-        end_of(code, self.said.or((!reason.is_empty()).then_some(reason)))
+        end_with(code, self.said.or((!reason.is_empty()).then_some(reason)))
     }
 
     fn broken(&mut self, why: String) -> anyhow::Error {
@@ -158,7 +158,7 @@ impl Receiver {
 }
 
 /// What it means that the server closed with this code.
-fn end_of(code: u16, said: Option<String>) -> anyhow::Result<()> {
+fn end_with(code: u16, said: Option<String>) -> anyhow::Result<()> {
     match (code, said) {
         (GOING_AWAY | ABNORMAL | RESTART | TRY_AGAIN, said) => {
             Err(Lost(said.unwrap_or_else(|| format!("the server closed with code {code}"))).into())
@@ -224,14 +224,14 @@ mod tests {
 
     #[test]
     fn what_may_pass_is_lost_and_the_rest_is_over() {
-        assert!(end_of(NORMAL, None).is_ok());
+        assert!(end_with(NORMAL, None).is_ok());
         for code in [1001, 1006, 1012, 1013] {
-            assert!(end_of(code, None).unwrap_err().is::<Lost>(), "{code}");
+            assert!(end_with(code, None).unwrap_err().is::<Lost>(), "{code}");
         }
-        let refused = end_of(1008, Some("frame 3 has 2 coordinates".to_owned())).unwrap_err();
+        let refused = end_with(1008, Some("frame 3 has 2 coordinates".to_owned())).unwrap_err();
         assert!(!refused.is::<Lost>() && refused.to_string().starts_with("frame 3"));
-        assert!(!end_of(1011, None).unwrap_err().is::<Lost>());
+        assert!(!end_with(1011, None).unwrap_err().is::<Lost>());
         // An address or the like is said beside it.
-        assert!(end_of(1013, None).unwrap_err().context("http://server").is::<Lost>());
+        assert!(end_with(1013, None).unwrap_err().context("http://server").is::<Lost>());
     }
 }

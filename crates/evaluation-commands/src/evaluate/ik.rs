@@ -13,7 +13,8 @@ use sample_motion::{Action, DrawOptions, Model};
 use serde::Serialize;
 use vision::scene::SilhouetteNoise;
 
-use super::{motions, written::write};
+use super::written::write;
+use crate::motions;
 
 /// `marey evaluate ik`
 #[derive(Debug, clap::Args)]

@@ -11,7 +11,7 @@ use library::AllCores;
 use motion_db::{Augment, Clip, IndexFile, MotionDatabase, write_index};
 use serde::Serialize;
 
-use crate::evaluate::motions;
+use crate::motions;
 use pass::{Measured, Search, Truth, measure};
 use questions::Run;
 

@@ -1,28 +1,24 @@
 //! `marey bench live`: how long a pose takes, from sending the frame to having it.
 
 use std::{
+    ffi::OsStr,
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     time::{Duration, Instant},
 };
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
+use client::{
+    Client, Latency, MotionDatabase, Server, ServerArgs,
+    live::{Connection, frame_message},
+    parameters::values,
+};
 use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::json;
 use tokio::time::MissedTickBehavior;
 
-use crate::{
-    cli::ServerArgs,
-    client::{Client, MotionDatabase},
-    connection::Server,
-    database,
-    evaluate::motions,
-    live::{Connection, Latency, frame_message, values},
-    sample::Trials,
-    serve::runtime,
-    watch,
-};
+use crate::motions;
 
 const POINTS: [&str; 6] = ["left_wrist", "right_wrist", "left_ankle", "right_ankle", "root", "head"];
 /// How long a server may take to start.
@@ -98,14 +94,15 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Some(name) => (args.server.server()?, name.clone(), None),
         None => {
             let (server, process) = OwnServer::start(folder.path())?;
-            build(&Client::new(server.clone()), &args.train, folder.path())?;
+            build(&server, &args.train, folder.path())?;
             (server, "bench".to_owned(), Some(process))
         }
     };
     let client = Client::new(server.clone());
-    let built: MotionDatabase =
-        client.get(&format!("/v1/motion-databases/{}", crate::client::encode(&database)))?;
-    let latency = runtime()?.block_on(stream_all(args, &server, &database, performers))?;
+    let built: MotionDatabase = client.get(&format!("/v1/motion-databases/{}", client::encode(&database)))?;
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build();
+    let runtime = runtime.context("the runtime can't be started")?;
+    let latency = runtime.block_on(stream_all(args, &server, &database, performers))?;
     let report = Report {
         streams: args.streams,
         fps: args.fps,
@@ -149,7 +146,7 @@ fn performers(args: &Args, folder: &Path) -> anyhow::Result<Vec<Performer>> {
     let mut test = args.test.clone();
     if test.is_empty() {
         let samples = folder.join("test");
-        trials(args.streams as u32, 1000).write(&samples)?;
+        draw_trials(&samples, args.streams, 1000)?;
         test.push(samples);
     }
     let names = &POINTS[..usize::from(args.points)];
@@ -165,19 +162,42 @@ fn performers(args: &Args, folder: &Path) -> anyhow::Result<Vec<Performer>> {
     Ok((0..args.streams).map(performer).collect())
 }
 
-fn trials(count: u32, seed: u64) -> Trials {
-    Trials { count, seed, action: None, frames: 600, points: None }
+/// Another command of this program, which says on standard output only what this one does not.
+fn marey(arguments: &[&OsStr]) -> anyhow::Result<Command> {
+    let mut command = Command::new(std::env::current_exe().context("this program")?);
+    command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null());
+    Ok(command)
 }
 
-fn build(client: &Client, train: &[PathBuf], folder: &Path) -> anyhow::Result<()> {
+fn run_to_its_end(mut command: Command) -> anyhow::Result<()> {
+    let status = command.status().context("this program")?;
+    ensure!(
+        status.success(),
+        "`marey {}` ended with {status}",
+        command.get_args().collect::<Vec<_>>().join(OsStr::new(" ")).display()
+    );
+    Ok(())
+}
+
+/// Synthetic trials of ten seconds.
+fn draw_trials(folder: &Path, count: usize, seed: u64) -> anyhow::Result<()> {
+    let mut command = marey(&["sample".as_ref(), "--out".as_ref(), folder.as_os_str()])?;
+    command.args(["--frames", "600", "--count", &count.to_string(), "--seed", &seed.to_string()]);
+    run_to_its_end(command)
+}
+
+/// Has a database built from the folders given, else from synthetic trials.
+fn build(server: &Server, train: &[PathBuf], folder: &Path) -> anyhow::Result<()> {
     let mut train = train.to_vec();
     if train.is_empty() {
         let samples = folder.join("train");
-        trials(40, 1).write(&samples)?;
+        draw_trials(&samples, 40, 1)?;
         train.push(samples);
     }
-    let (_, run) = database::build(client, "bench", &train)?;
-    watch::until_end(client, &run.id)
+    let mut command = marey(&["db", "build", "bench"].map(OsStr::new))?;
+    command.args(&train).arg("--watch");
+    command.env("MAREY_URL", &server.url).env("MAREY_API_KEY", &server.api_key);
+    run_to_its_end(command)
 }
 
 async fn stream_all(
@@ -211,7 +231,7 @@ async fn stream_all(
         latencies.extend(seconds);
         dropped += lost;
     }
-    Ok(Latency::of(latencies, count * number as u64, dropped))
+    Ok(Latency::from_seconds(latencies, count * number as u64, dropped))
 }
 
 /// Sends `count` frames, one a period; how long each pose took, seconds, and how many frames had none.
@@ -255,14 +275,12 @@ struct OwnServer(Child);
 impl OwnServer {
     fn start(folder: &Path) -> anyhow::Result<(Server, Self)> {
         let data = folder.join("server");
-        let program = std::env::current_exe().context("this program")?;
-        let mut command = Command::new(program);
-        command.arg("up").arg("--data-dir").arg(&data).args(["--listen", "127.0.0.1:0"]);
-        let child = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn().context("marey up")?;
+        let mut command = marey(&["up".as_ref(), "--data-dir".as_ref(), data.as_os_str()])?;
+        let child = command.args(["--listen", "127.0.0.1:0"]).spawn().context("marey up")?;
         let mut own = Self(child);
         let begin = Instant::now();
         loop {
-            if let Some(server) = Server::of_data_dir(&data).ok().flatten() {
+            if let Some(server) = Server::in_data_dir(&data).ok().flatten() {
                 return Ok((server, own));
             }
             if let Some(status) = own.0.try_wait()? {

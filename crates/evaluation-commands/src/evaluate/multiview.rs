@@ -22,7 +22,8 @@ use shape_fit::{Fit, fit};
 use tracking::{ObservedFrame, Options, Part, ParticleOptions, Tracked, Tracker, built_in_poses};
 use vision::scene::SilhouetteNoise;
 
-use super::{capture::Folder, motions, recovery, shape, written::write};
+use super::{capture::Folder, recovery, shape, written::write};
+use crate::motions;
 use film::Film;
 use joints::{JointErrors, Joints};
 use report::{FrameReport, Report, Settings, Times};

@@ -1,7 +1,5 @@
 //! `marey evaluate`: how far reconstructions are from the truth.
 
-pub(crate) mod motions;
-
 mod body_commands;
 mod capture;
 mod ik;

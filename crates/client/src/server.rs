@@ -57,7 +57,7 @@ impl Server {
     }
 
     /// The server whose data are in `data_dir`, if it ever ran.
-    pub fn of_data_dir(data_dir: &Path) -> anyhow::Result<Option<Self>> {
+    pub fn in_data_dir(data_dir: &Path) -> anyhow::Result<Option<Self>> {
         let path = file(data_dir);
         path.exists().then(|| Self::read(&path)).transpose()
     }

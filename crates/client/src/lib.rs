@@ -1,0 +1,13 @@
+//! A client of the gateway: its REST interface ([`Client`]), its live streams ([`live`]), and which server is meant.
+
+mod latency;
+pub mod live;
+pub mod parameters;
+mod rest;
+mod server;
+mod server_args;
+
+pub use latency::Latency;
+pub use rest::{Client, Jobs, MotionDatabase, Page, ResultFile, Run, Session, encode};
+pub use server::{DEFAULT_DATA_DIR, Server};
+pub use server_args::ServerArgs;
