@@ -27,7 +27,7 @@ pub fn gather(paths: &[PathBuf]) -> anyhow::Result<Vec<SessionFile>> {
     let mut found = Vec::new();
     for path in paths {
         if path.is_dir() {
-            found.extend(of_folder(path)?);
+            found.extend(from_folder(path)?);
             continue;
         }
         let own = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
@@ -39,7 +39,7 @@ pub fn gather(paths: &[PathBuf]) -> anyhow::Result<Vec<SessionFile>> {
     Ok(found)
 }
 
-fn of_folder(folder: &Path) -> anyhow::Result<Vec<SessionFile>> {
+fn from_folder(folder: &Path) -> anyhow::Result<Vec<SessionFile>> {
     let mut pictures = Vec::new();
     pack::collect_where(folder, folder, &is_picture, &mut pictures)?;
     if pictures.is_empty() {

@@ -64,8 +64,9 @@ fn subject(run: &Run) -> String {
     match run.parameters["session_name"].as_str() {
         Some(name) => name.to_owned(),
         None => {
-            let of = &run.parameters;
-            let built = if of["body_model"].is_object() { &of["body_model"] } else { &of["motion_database"] };
+            let asked = &run.parameters;
+            let key = if asked["body_model"].is_object() { "body_model" } else { "motion_database" };
+            let built = &asked[key];
             format!("{}@{}", built["name"].as_str().unwrap_or("?"), built["version"])
         }
     }

@@ -64,7 +64,7 @@ impl Source {
     /// Opens a file, or standard input for `-`; `chosen`: the points to use, all if empty.
     pub fn open(path: &Path, chosen: &[String]) -> anyhow::Result<Self> {
         if path == Path::new("-") {
-            return Self::of_stdin(chosen);
+            return Self::from_stdin(chosen);
         }
         let name = || path.display().to_string();
         let bytes = std::fs::read(path).with_context(name)?;
@@ -93,7 +93,7 @@ impl Source {
         Ok(Self::File { names, columns, trajectories, next: 0, step: step as usize })
     }
 
-    fn of_stdin(chosen: &[String]) -> anyhow::Result<Self> {
+    fn from_stdin(chosen: &[String]) -> anyhow::Result<Self> {
         let mut line_number = 0;
         let mut header = String::new();
         while is_skipped(&header) {
@@ -102,7 +102,7 @@ impl Source {
             let read = std::io::stdin().read_line(&mut header).context("standard input")?;
             ensure!(read > 0, "standard input has no line, expected a header: time,left_wrist_x,…");
         }
-        let columns = Columns::of_header(&header, chosen)?;
+        let columns = Columns::from_header(&header, chosen)?;
         let (line_read, lines) = mpsc::channel(LINES_AHEAD);
         // Reading may block for ever: the thread ends with the program.
         std::thread::spawn(move || {
@@ -165,8 +165,8 @@ fn is_skipped(line: &str) -> bool {
 }
 
 impl Columns {
-    /// Of the first line; `chosen`: the points to use, all if empty.
-    fn of_header(header: &str, chosen: &[String]) -> anyhow::Result<Self> {
+    /// From the first line; `chosen`: the points to use, all if empty.
+    fn from_header(header: &str, chosen: &[String]) -> anyhow::Result<Self> {
         let titles: Vec<&str> = header.trim().split(',').map(str::trim).collect();
         let with_x = titles.iter().filter_map(|title| title.strip_suffix("_x"));
         let names: Vec<String> =
@@ -221,19 +221,19 @@ mod tests {
 
     #[test]
     fn a_line_has_positions_and_standard_deviations() {
-        let columns = Columns::of_header(HEADER, &[]).unwrap();
+        let columns = Columns::from_header(HEADER, &[]).unwrap();
         assert_eq!(columns.names, ["head", "root"]);
         let measured = columns.read("0,1,2,3,0.01,4,,6").unwrap();
         assert_eq!(measured.positions[0], Vector3::new(1.0, 2.0, 3.0));
         assert!(measured.positions[1].y.is_nan());
         assert_eq!((measured.sigmas[0], measured.sigmas[1].is_nan()), (0.01, true));
-        let columns = Columns::of_header(HEADER, &["root".to_owned()]).unwrap();
+        let columns = Columns::from_header(HEADER, &["root".to_owned()]).unwrap();
         assert!(columns.read("0,1,2,3,0.01,4,5,6").unwrap().sigmas.is_empty());
     }
 
     #[test]
     fn a_line_that_makes_no_sense_is_refused() {
-        let columns = Columns::of_header(HEADER, &[]).unwrap();
+        let columns = Columns::from_header(HEADER, &[]).unwrap();
         for (line, expected) in [
             ("0,1,2,3,0.01,4,5", "7 cells"),
             ("0,1,2,x,0.01,4,5,6", "\"x\" is no number"),
@@ -242,12 +242,12 @@ mod tests {
             let error = columns.read(line).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
-        assert!(Columns::of_header("time,head_x,head_z,head_y", &[]).is_err());
+        assert!(Columns::from_header("time,head_x,head_z,head_y", &[]).is_err());
     }
 
     #[tokio::test]
     async fn comments_are_skipped_and_errors_say_the_line() {
-        let columns = Columns::of_header(HEADER, &[]).unwrap();
+        let columns = Columns::from_header(HEADER, &[]).unwrap();
         let (line_read, lines) = mpsc::channel(4);
         for line in ["# metres", "", "0,1,2,3,0.01,4,5,6", "0,1"] {
             line_read.try_send(Ok(line.to_owned())).unwrap();
