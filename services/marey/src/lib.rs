@@ -24,6 +24,7 @@ mod take;
 mod up;
 mod upload;
 mod watch;
+mod words;
 
 use std::process::ExitCode;
 
