@@ -12,6 +12,8 @@ use anyhow::{Context, bail};
 use formats::asf;
 use ureq::{Agent, http::StatusCode};
 
+use crate::words::counted;
+
 /// Where the database is.
 const CMU: &str = "http://mocap.cs.cmu.edu";
 /// Where there is no listing, numbers are tried until so many in a row are missing.
@@ -23,22 +25,23 @@ const TRIES: u32 = 4;
 
 /// Download ASF and AMC files of the CMU Graphics Lab Motion Capture Database
 ///
-/// Writes DIR/16/16.asf, DIR/16/16_01.amc, … Files that are there are not downloaded again, and one that broke off is
-/// continued; so just start it again. The data are free for all uses, but may not be resold; see http://mocap.cs.cmu.edu.
+/// Writes DIR/16/16.asf, DIR/16/16_01.amc, … Files that are already there are not downloaded again, and one that broke off is
+/// continued (it is called .part until it is whole): just start it again. The data are free for all uses, but may not be
+/// resold; see http://mocap.cs.cmu.edu.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey data cmu --subjects 16,35 recordings/
   marey data cmu --subjects 16 --trials 15,16,21 recordings/")]
 pub struct Args {
-    /// Subjects by number
+    /// Subjects, by number, separated by commas
     #[arg(long, required = true, value_delimiter = ',')]
     subjects: Vec<u32>,
-    /// Trials by number [default: all]
+    /// Trials, by number, separated by commas [default: all]
     #[arg(long, value_delimiter = ',')]
     trials: Vec<u32>,
     /// Folder to write to
     dir: PathBuf,
-    /// Another place with the same files
+    /// Server with the same files in the same places
     #[arg(long, default_value = CMU)]
     base_url: String,
 }
@@ -66,7 +69,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         num_trials += outcome.num_trials;
         refused.extend(outcome.refused);
     }
-    println!("{num_trials} trials of {} subjects are in {}", args.subjects.len(), args.dir.display());
+    println!(
+        "{} of {} in {}",
+        counted(num_trials as u64, "trial"),
+        counted(args.subjects.len() as u64, "subject"),
+        args.dir.display()
+    );
     println!(
         "The data used in this project was obtained from mocap.cs.cmu.edu.\n\
          The database was created with funding from NSF EIA-0196217."
@@ -74,7 +82,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if refused.is_empty() {
         Ok(())
     } else {
-        bail!("{} files can't be read:\n{}", refused.len(), refused.join("\n"))
+        bail!("{} could not be had:\n{}", counted(refused.len() as u64, "file"), refused.join("\n"))
     }
 }
 
@@ -97,6 +105,7 @@ impl Subject<'_> {
         let name = format!("{}.asf", self.name);
         let is_skeleton = |bytes: &[u8]| asf::read(bytes).map(|_| ()).map_err(|e| e.to_string());
         let Some(skeleton) = self.file(&name, is_skeleton)? else {
+            self.leave_nothing_empty(None);
             bail!("there is no subject {} at {}", self.name, self.url);
         };
         let acclaim = match skeleton {
@@ -164,8 +173,13 @@ impl Subject<'_> {
         }
         let url = format!("{}/{name}", self.url);
         let part = self.folder.join(format!("{name}.part"));
-        if !self.fetch(&url, &part)? {
-            return Ok(None);
+        match self.fetch(&url, &part) {
+            Ok(true) => {}
+            Ok(false) => return Ok(None),
+            Err(error) => {
+                self.leave_nothing_empty(Some(&part));
+                return Err(error);
+            }
         }
         let bytes = fs::read(&part).with_context(at)?;
         if let Err(reason) = check(&bytes) {
@@ -175,6 +189,15 @@ impl Subject<'_> {
         fs::rename(&part, &path).with_context(at)?;
         println!("{} ({:.1} MB)", path.display(), bytes.len() as f64 / 1e6);
         Ok(Some(Ok(bytes)))
+    }
+
+    /// Removes what an attempt left that got nothing: the empty file, and the folder if nothing else is in it.
+    fn leave_nothing_empty(&self, part: Option<&Path>) {
+        // what can't be removed is in use or has gone: neither matters here
+        if let Some(part) = part.filter(|part| fs::metadata(part).is_ok_and(|file| file.len() == 0)) {
+            let _ = fs::remove_file(part);
+        }
+        let _ = fs::remove_dir(&self.folder);
     }
 
     /// Downloads to `part`, going on where an earlier try broke off; `false` if the server has no such file.

@@ -40,7 +40,7 @@ pub fn pack(name: &str, paths: &[PathBuf]) -> anyhow::Result<Vec<Upload>> {
             single.push(path.clone());
         } else {
             bail!(
-                "{} is no archive, no motion file (.asf, .amc, .bvh, also with .zst or .gz) and no folder",
+                "{} is neither a motion file (.asf, .amc, .bvh, also with .zst or .gz) nor an archive or a folder",
                 path.display()
             );
         }
@@ -62,7 +62,7 @@ pub fn pack(name: &str, paths: &[PathBuf]) -> anyhow::Result<Vec<Upload>> {
         uploads.push(Upload { name, file: write_tar(piece)?, num_files: piece.len() });
     }
     if uploads.is_empty() {
-        bail!("there are no motion files (.asf, .amc, .bvh, also with .zst or .gz) in what was given");
+        bail!("no motion files (.asf, .amc, .bvh, also with .zst or .gz) in {}", listed(paths));
     }
     Ok(uploads)
 }
@@ -165,7 +165,7 @@ pub fn pack_where(
         } else if is_wanted(&file_name) {
             loose.push((path.clone(), file_name.into()));
         } else {
-            bail!("{} is no archive, no folder and no file of scans", path.display());
+            bail!("{} is neither a file of scans nor an archive or a folder", path.display());
         }
     }
     loose.sort_by(|a, b| a.1.cmp(&b.1));
@@ -177,7 +177,7 @@ pub fn pack_where(
         });
     }
     if uploads.is_empty() {
-        bail!("there are no scans (.obj, .ply, .npy) in what was given");
+        bail!("no scans (.obj, .ply, .npy) in {}", listed(paths));
     }
     Ok(uploads)
 }
@@ -197,6 +197,10 @@ pub fn write_tar(files: &[(PathBuf, PathBuf)]) -> anyhow::Result<File> {
     Ok(file)
 }
 
+fn listed(paths: &[PathBuf]) -> String {
+    paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
+}
+
 fn open(path: &Path) -> anyhow::Result<File> {
     File::open(path).with_context(|| path.display().to_string())
 }
@@ -204,6 +208,21 @@ fn open(path: &Path) -> anyhow::Result<File> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_broke_off_while_it_was_downloaded_is_left_out() -> anyhow::Result<()> {
+        let folder = tempfile::tempdir()?;
+        for name in ["16.asf.part", "16_01.amc.part"] {
+            fs::write(folder.path().join(name), "x")?;
+        }
+        let message = pack("walks", &[folder.path().to_owned()]).unwrap_err().to_string();
+        assert!(message.starts_with("no motion files") && message.contains("in /"), "{message}");
+        fs::write(folder.path().join("16.asf"), "x")?;
+        assert_eq!(pack("walks", &[folder.path().to_owned()])?[0].num_files, 1);
+        let alone = pack("walks", &[folder.path().join("16.asf.part")]).unwrap_err().to_string();
+        assert!(alone.contains("16.asf.part is neither a motion file"), "{alone}");
+        Ok(())
+    }
 
     #[test]
     fn many_motions_go_in_pieces_each_with_all_skeletons() -> anyhow::Result<()> {
