@@ -1,5 +1,7 @@
 //! `marey live`: points as they are measured go to the server, poses come back.
 
+mod pace;
+mod rate;
 mod source;
 
 use std::{
@@ -33,15 +35,16 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// Follow a performer live
 ///
 /// Streams measured points to a server at 60 frames a second, as a motion capture system would, and writes the poses that
-/// come back. A file (.csv, .trc, .c3d) is played in real time; with '-', lines of such a .csv are sent as they come in. A
-/// connection that is lost is opened again, for up to a minute, and goes on from the last state.
+/// come back. A file (.csv, .trc, .c3d) is played in real time. With '-', lines of such a .csv are read from standard input, 60
+/// a second or a multiple: each is sent as it comes in, but not before its time, so that a file may be piped in as well. A
+/// lost connection is opened again, for up to a minute, and goes on from the last state.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  marey live points.csv --database walks --skeleton performer.asf -o poses.csv
-  capture-program | marey live - --database walks > poses.csv
-  marey live points.csv --database walks --state-file performer.state     go on where it ended last time")]
+  marey live points.csv --database walks --skeleton skeleton.asf -o poses.csv
+  cat points.csv | marey live - --database walks > poses.csv
+  marey live points.csv --database walks --state-file performer.state     # goes on where it ended last time")]
 pub struct Args {
-    /// Measured points: .csv (time,left_wrist_x,…; metres, y up), .trc or .c3d; '-' reads lines of a .csv
+    /// Measured points: a .csv (time,left_wrist_x,…; seconds and metres, y up), .trc or .c3d file, or '-' for lines of a .csv
     points: PathBuf,
     /// Motion database to learn from: NAME (its latest version) or NAME@VERSION
     #[arg(long, short)]
@@ -52,17 +55,17 @@ pub struct Args {
     /// Control points to use, separated by commas [default: all in the file]
     #[arg(long = "use", value_delimiter = ',', value_name = "POINTS")]
     chosen: Vec<String>,
-    /// Where the poses go, as CSV: frame, then a column for each degree of freedom, metres and radians; a file
-    /// is written anew [default: the terminal]
+    /// File for the poses, as CSV: frame, then a column for each degree of freedom, metres and radians; what was in it is
+    /// replaced [default: the terminal]
     #[arg(long, short)]
     output: Option<PathBuf>,
-    /// Compute every frame, however late, instead of dropping what can't be computed in time
+    /// Compute every frame, however late, instead of dropping those that can't be computed in time
     #[arg(long)]
     every: bool,
-    /// Go on from the state in this file, if it is there, and keep the last one in it
+    /// Go on from the state in this file, if it exists, and keep the last state in it
     #[arg(long, value_name = "FILE")]
     state_file: Option<PathBuf>,
-    /// Parameter of the method: NAME=VALUE; may be given often
+    /// Parameter of the method; may be given several times
     #[arg(long = "set", value_name = "NAME=VALUE")]
     parameters: Vec<String>,
     #[command(flatten)]
@@ -252,7 +255,7 @@ fn replace_file(path: &Path, content: &[u8]) -> anyhow::Result<()> {
     fs::rename(&part, path).with_context(|| path.display().to_string())
 }
 
-/// What is sent: a file's frames at 60 a second, those of standard input as they come.
+/// What is sent: a file's frames at 60 a second, those of standard input when they are due.
 struct Feed {
     source: Source,
     clock: Interval,

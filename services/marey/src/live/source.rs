@@ -1,6 +1,6 @@
 //! Where the frames of `marey live` come from.
 
-use std::{io::BufRead, path::Path};
+use std::{io::BufRead, path::Path, time::Instant};
 
 use anyhow::{Context, bail, ensure};
 use formats::PointsOptions;
@@ -8,8 +8,11 @@ use model::{PointTrajectories, Samples};
 use nalgebra::Vector3;
 use tokio::sync::mpsc;
 
-/// Frames a second that a server takes.
-const FRAME_RATE: f64 = 60.0;
+use super::{
+    pace::Pace,
+    rate::{FRAME_RATE, Rate},
+};
+
 /// Lines that are read before they can be sent.
 const LINES_AHEAD: usize = 4;
 
@@ -33,6 +36,8 @@ impl Measured {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Columns {
     names: Vec<String>,
+    /// the column of the time, seconds, if there is one
+    time: Option<usize>,
     /// the column of each point's x; y and z follow
     x: Vec<usize>,
     /// the column of each point's standard deviation, if it has one
@@ -51,9 +56,13 @@ pub enum Source {
         next: usize,
         step: usize,
     },
-    /// lines of a .csv, a frame each
+    /// lines of a .csv, a frame each, at the times that they say
     Lines {
         columns: Columns,
+        rate: Rate,
+        pace: Pace,
+        /// read, but not due yet
+        next: Option<(Instant, Measured)>,
         /// lines read, the header among them
         line_number: u64,
         lines: mpsc::Receiver<std::io::Result<String>>,
@@ -112,7 +121,11 @@ impl Source {
                 }
             }
         });
-        Ok(Self::Lines { columns, line_number, lines })
+        Ok(Self::lines(columns, line_number, lines))
+    }
+
+    fn lines(columns: Columns, line_number: u64, lines: mpsc::Receiver<std::io::Result<String>>) -> Self {
+        Self::Lines { columns, rate: Rate::default(), pace: Pace::default(), next: None, line_number, lines }
     }
 
     /// Names of the points.
@@ -123,12 +136,13 @@ impl Source {
         }
     }
 
-    /// Whether frames are there before their time.
+    /// Whether it is a file, whose frames are there before their time.
     pub fn is_file(&self) -> bool {
         matches!(self, Self::File { .. })
     }
 
-    /// The next frame; `None` at the end. Nothing is lost when the waiting for it is given up.
+    /// The next frame: of a file at once, of lines when it is due; `None` at the end. Nothing is lost when the waiting for it
+    /// is given up.
     pub async fn next(&mut self) -> anyhow::Result<Option<Measured>> {
         match self {
             Self::File { columns, trajectories, next, step, .. } => {
@@ -143,16 +157,31 @@ impl Source {
                     if samples.sigmas.is_empty() { Vec::new() } else { columns.iter().map(sigma).collect() };
                 Ok(Some(Measured { positions, sigmas }))
             }
-            Self::Lines { columns, line_number, lines } => {
-                while let Some(line) = lines.recv().await {
+            Self::Lines { columns, rate, pace, next, line_number, lines } => {
+                while next.is_none() {
+                    let (line, waited) = match lines.try_recv() {
+                        Ok(line) => (Some(line), false),
+                        Err(_) => (lines.recv().await, true),
+                    };
+                    let Some(line) = line else { return Ok(None) };
                     let line = line.context("standard input")?;
                     *line_number += 1;
                     if !is_skipped(&line) {
                         let at = || format!("line {line_number} of standard input");
-                        return columns.read(&line).with_context(at).map(Some);
+                        let (seconds, measured) = columns.read(&line).with_context(at)?;
+                        let (takes, warning) = rate.takes(seconds);
+                        if let Some(warning) = warning {
+                            eprintln!("warning: {warning}");
+                        }
+                        if takes {
+                            *next = Some((pace.due(seconds, waited, Instant::now()), measured));
+                        }
                     }
                 }
-                Ok(None)
+                if let Some((due, _)) = next {
+                    tokio::time::sleep_until((*due).into()).await;
+                }
+                Ok(next.take().map(|(_, measured)| measured))
             }
         }
     }
@@ -185,22 +214,25 @@ impl Columns {
         };
         let x = names.iter().map(x).collect::<anyhow::Result<_>>()?;
         let sigma = names.iter().map(|name| column(format!("{name}_sigma"))).collect();
-        Ok(Self { x, sigma, width: titles.len(), names })
+        let time = column("time".to_owned());
+        Ok(Self { time, x, sigma, width: titles.len(), names })
     }
 
-    /// One frame. An empty cell or a number that is not finite was not measured.
-    fn read(&self, line: &str) -> anyhow::Result<Measured> {
+    /// The time of a line, seconds, NaN without one, and its frame. An empty cell or a number that is not finite was not
+    /// measured.
+    fn read(&self, line: &str) -> anyhow::Result<(f64, Measured)> {
         let cells: Vec<&str> = line.trim().split(',').map(str::trim).collect();
         let width = self.width;
         ensure!(cells.len() == width, "{} cells, expected {width} as in the first line", cells.len());
         let number = |at: usize| match cells[at] {
             "" => Ok(f64::NAN),
-            text => text.parse::<f64>().with_context(|| format!("{text:?} is no number")),
+            text => text.parse::<f64>().with_context(|| format!("{text:?} is not a number")),
         };
+        let seconds = self.time.map_or(Ok(f64::NAN), number)?;
         let point = |at: &usize| Ok(Vector3::new(number(*at)?, number(at + 1)?, number(at + 2)?));
         let positions = self.x.iter().map(point).collect::<anyhow::Result<_>>()?;
         if self.sigma.iter().all(Option::is_none) {
-            return Ok(Measured { positions, sigmas: Vec::new() });
+            return Ok((seconds, Measured { positions, sigmas: Vec::new() }));
         }
         let sigma = |at: &Option<usize>| {
             let found = at.map_or(Ok(f64::NAN), number)?;
@@ -209,7 +241,7 @@ impl Columns {
             Ok(found)
         };
         let sigmas = self.sigma.iter().map(sigma).collect::<anyhow::Result<_>>()?;
-        Ok(Measured { positions, sigmas })
+        Ok((seconds, Measured { positions, sigmas }))
     }
 }
 
@@ -223,12 +255,13 @@ mod tests {
     fn a_line_has_positions_and_standard_deviations() {
         let columns = Columns::from_header(HEADER, &[]).unwrap();
         assert_eq!(columns.names, ["head", "root"]);
-        let measured = columns.read("0,1,2,3,0.01,4,,6").unwrap();
+        let (seconds, measured) = columns.read("0.5,1,2,3,0.01,4,,6").unwrap();
+        assert_eq!(seconds, 0.5);
         assert_eq!(measured.positions[0], Vector3::new(1.0, 2.0, 3.0));
         assert!(measured.positions[1].y.is_nan());
         assert_eq!((measured.sigmas[0], measured.sigmas[1].is_nan()), (0.01, true));
         let columns = Columns::from_header(HEADER, &["root".to_owned()]).unwrap();
-        assert!(columns.read("0,1,2,3,0.01,4,5,6").unwrap().sigmas.is_empty());
+        assert!(columns.read("0,1,2,3,0.01,4,5,6").unwrap().1.sigmas.is_empty());
     }
 
     #[test]
@@ -236,7 +269,7 @@ mod tests {
         let columns = Columns::from_header(HEADER, &[]).unwrap();
         for (line, expected) in [
             ("0,1,2,3,0.01,4,5", "7 cells"),
-            ("0,1,2,x,0.01,4,5,6", "\"x\" is no number"),
+            ("0,1,2,x,0.01,4,5,6", "\"x\" is not a number"),
             ("0,1,2,3,0,4,5,6", "a standard deviation is 0"),
         ] {
             let error = columns.read(line).unwrap_err().to_string();
@@ -253,10 +286,32 @@ mod tests {
             line_read.try_send(Ok(line.to_owned())).unwrap();
         }
         drop(line_read);
-        let mut source = Source::Lines { columns, line_number: 1, lines };
+        let mut source = Source::lines(columns, 1, lines);
         assert!(source.next().await.unwrap().is_some());
         let error = source.next().await.unwrap_err().to_string();
         assert_eq!(error, "line 5 of standard input");
+        assert!(source.next().await.unwrap().is_none());
+    }
+
+    #[tokio::test]
+    async fn lines_are_paced_and_none_is_lost_by_giving_up_waiting() {
+        let columns = Columns::from_header("time,head_x,head_y,head_z", &[]).unwrap();
+        let (line_read, lines) = mpsc::channel(4);
+        // twelve frames are missing between the last two
+        for line in ["0.0000,0,0,0", "0.0167,1,0,0", "0.2167,2,0,0"] {
+            line_read.try_send(Ok(line.to_owned())).unwrap();
+        }
+        drop(line_read);
+        let mut source = Source::lines(columns, 1, lines);
+        let begin = Instant::now();
+        let x = |measured: Option<Measured>| measured.map(|measured| measured.positions[0].x);
+        for expected in [0.0, 1.0] {
+            assert_eq!(x(source.next().await.unwrap()), Some(expected));
+        }
+        let given_up = tokio::time::timeout(std::time::Duration::from_millis(10), source.next()).await;
+        assert!(given_up.is_err(), "the third line is due after 0.2 s");
+        assert_eq!(x(source.next().await.unwrap()), Some(2.0));
+        assert!(begin.elapsed().as_secs_f64() >= 0.2);
         assert!(source.next().await.unwrap().is_none());
     }
 }
