@@ -222,10 +222,35 @@ impl Client {
         }
     }
 
-    /// The session of that id, or the newest of that name.
+    /// The session of that id, or the newest of that name; says so on the terminal if others have the name too.
     pub fn find_session(&self, which: &str) -> anyhow::Result<Option<Session>> {
         let sessions: Vec<Session> = self.list_all("/v1/sessions")?;
-        Ok(sessions.into_iter().find(|session| session.id == which || session.name == which))
+        let mut found = sessions.into_iter().filter(|session| session.id == which || session.name == which);
+        let newest = found.next();
+        if let (Some(session), others @ 1..) = (&newest, found.count()) {
+            eprintln!(
+                "note: {} sessions are called {which:?}; the newest is meant, id {}",
+                others + 1,
+                session.id
+            );
+        }
+        Ok(newest)
+    }
+
+    /// The id of a run: the one given, or that of the newest run of the session of that name.
+    ///
+    /// # Errors
+    /// If it is neither an id nor the name of a session that has a run.
+    pub fn find_run(&self, which: &str) -> anyhow::Result<String> {
+        if is_id(which) {
+            return Ok(which.to_owned());
+        }
+        let Some(session) = self.find_session(which)? else {
+            bail!("there is no run and no session {which:?}; `marey status` lists the runs");
+        };
+        let runs: Page<Run> = self.get(&format!("/v1/sessions/{}/runs?limit=1", session.id))?;
+        let newest = runs.items.into_iter().next().map(|run| run.id);
+        newest.with_context(|| format!("session {which:?} has no run yet; start one: marey run {which:?}"))
     }
 
     /// Makes a session.
@@ -275,6 +300,15 @@ fn idempotency_key(path: &str, body: &Value) -> String {
     blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 
+/// Whether a word is an id, as the server gives them: hexadecimal digits in groups of 8, 4, 4, 4 and 12.
+fn is_id(word: &str) -> bool {
+    let groups: Vec<&str> = word.split('-').collect();
+    let is_group = |(group, length): (&&str, usize)| {
+        group.len() == length && group.bytes().all(|byte| byte.is_ascii_hexdigit())
+    };
+    groups.len() == 5 && groups.iter().zip([8, 4, 4, 4, 12]).all(is_group)
+}
+
 /// A part of a path.
 pub fn encode(part: &str) -> String {
     part.bytes()
@@ -283,4 +317,17 @@ pub fn encode(part: &str) -> String {
             b => format!("%{b:02X}"),
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_id;
+
+    #[test]
+    fn ids_are_told_from_names() {
+        assert!(is_id("0199a1b2-0c3d-7e4f-8a9b-0c1d2e3f4a5b"));
+        for name in ["take 3", "", "0199a1b2", "0199a1b2-0c3d-7e4f-8a9b-0c1d2e3f4a5g", "a-b-c-d-e"] {
+            assert!(!is_id(name), "{name:?}");
+        }
+    }
 }

@@ -8,15 +8,18 @@ use std::{
 use anyhow::Context;
 use client::{Client, ResultFile, ServerArgs, encode};
 
-/// Download what a run has made
+/// List or download the results of a run
+///
+/// For Blender: File > Import > Motion Capture (.bvh), then motion.bvh. Of a session with cameras, look at
+/// overlay_CAMERA.mp4 first; body.glb opens in Blender by File > Import > glTF 2.0.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:
-  marey results 0198… -o take3/        then open take3/motion.bvh in Blender: File > Import > Motion Capture (.bvh);
-                                       of cameras: look at take3/overlay_CAMERA.mp4, open take3/body.glb")]
+#[command(after_help = "Examples:
+  marey results \"take 3\"                # lists them
+  marey results \"take 3\" -o take3/      # downloads them")]
 pub struct Args {
-    /// The run's id
+    /// The run: its id, or the name of a session, whose newest run is meant
     run: String,
-    /// Folder to download into; without it, the results are only listed
+    /// Folder to download into [default: nothing is downloaded, the results are listed]
     #[arg(long, short)]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -26,12 +29,13 @@ pub struct Args {
 /// Runs `marey results`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
+    let run = client.find_run(&args.run)?;
     let results = match &args.output {
-        Some(folder) => download(&client, &args.run, folder)?,
-        None => list(&client, &args.run)?,
+        Some(folder) => download(&client, &run, folder)?,
+        None => list(&client, &run)?,
     };
     if results.is_empty() {
-        println!("no results (yet); see `marey status {}`", args.run);
+        println!("no results yet; see `marey status {run}`");
     }
     for result in results {
         let shown =

@@ -1,14 +1,18 @@
 //! `marey status` and `marey cancel`.
 
-use client::{Client, Page, Run, ServerArgs, encode};
+use client::{Client, Page, Run, ServerArgs};
 use serde_json::json;
 
 use crate::watch;
 
-/// Show runs and how far they are
+/// Show how far runs are
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  marey status                        # the latest runs
+  marey status \"take 3\"               # the newest run of a session
+  marey status \"take 3\" --watch")]
 pub struct Args {
-    /// A run's id; without it, the latest runs are listed
+    /// The run: its id, or the name of a session, whose newest run is meant [default: the latest runs are listed]
     run: Option<String>,
     /// Show the progress and wait for the end
     #[arg(long, short, requires = "run")]
@@ -19,8 +23,10 @@ pub struct Args {
 
 /// Cancel a run
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  marey cancel \"take 3\"")]
 pub struct CancelArgs {
-    /// The run's id
+    /// The run: its id, or the name of a session, whose newest run is meant
     run: String,
     #[command(flatten)]
     server: ServerArgs,
@@ -30,7 +36,7 @@ pub struct CancelArgs {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
     let Some(id) = &args.run else { return list(&client) };
-    let run: Run = client.get(&format!("/v1/runs/{}", encode(id)))?;
+    let run: Run = client.get(&format!("/v1/runs/{}", client.find_run(id)?))?;
     show(&run);
     if args.watch {
         watch::until_end(&client, &run.id)?;
@@ -42,7 +48,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 /// Runs `marey cancel`.
 pub fn cancel(args: &CancelArgs) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
-    let run: Run = client.post(&format!("/v1/runs/{}/cancel", encode(&args.run)), &json!({}))?;
+    let path = format!("/v1/runs/{}/cancel", client.find_run(&args.run)?);
+    let run: Run = client.post(&path, &json!({}))?;
     println!("run {} is {}", run.id, run.state);
     Ok(())
 }
@@ -72,11 +79,20 @@ fn subject(run: &Run) -> String {
     }
 }
 
+/// Its state, and while it goes on how far it is.
+fn state(run: &Run) -> String {
+    match (run.state.as_str(), run.phrase.as_str()) {
+        ("running", "") => format!("running, {:.0} %", run.progress * 100.0),
+        ("running", phrase) => format!("running, {:.0} %: {phrase}", run.progress * 100.0),
+        (state, _) => state.to_owned(),
+    }
+}
+
 fn show(run: &Run) {
     println!("run      {}", run.id);
     println!("what     {}: {}", run.kind, subject(run));
     println!("asked    {}", run.created_at);
-    println!("state    {}, {:.0} %, {}", run.state, run.progress * 100.0, run.phrase);
+    println!("state    {}", state(run));
     if let Some(error) = &run.error {
         println!("error    {error}");
     }
@@ -84,5 +100,24 @@ fn show(run: &Run) {
         let workers =
             if jobs.workers.is_empty() { String::new() } else { format!("  by {}", jobs.workers.join(", ")) };
         println!("jobs     {:>4} {:<24} {}{workers}", jobs.count, jobs.kind, jobs.state);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_state_says_how_far_only_what_is_going_on() {
+        let run = |state: &str, phrase: &str| {
+            let run = json!({
+                "id": "1", "kind": "multi-view", "state": state, "progress": 0.4, "phrase": phrase,
+                "error": null, "created_at": "2025-01-01T00:00:00Z",
+            });
+            super::state(&serde_json::from_value::<Run>(run).unwrap())
+        };
+        assert_eq!(run("running", "reading the files"), "running, 40 %: reading the files");
+        assert_eq!(run("running", ""), "running, 40 %");
+        assert_eq!(run("succeeded", ""), "succeeded");
     }
 }
