@@ -17,24 +17,32 @@ use crate::{pack, watch};
 /// `marey body …`
 #[derive(Debug, clap::Subcommand)]
 pub enum Command {
-    /// List body models, all versions
+    /// List all body models and their versions
+    #[command(after_help = "Examples:
+  marey body list")]
     List(ServerArgs),
+    #[command(after_help = "Examples:
+  marey body show shipped
+  marey body show athletes.marey-body")]
     Show(ShowArgs),
     #[command(after_help = "Examples:
-  marey body learn athletes scans.zip --watch            on the server, for runs
-  marey body learn athletes scans/ rig/ --out athletes.marey-body")]
+  marey body learn athletes scans/ --watch                       # on the server, for its runs
+  marey body learn athletes scans/ --out athletes.marey-body     # here, into a file")]
     Learn(LearnArgs),
     #[command(after_help = "Examples:
   marey body sample --stature 1.80 --mass 75 --out body.glb
   marey body sample --model athletes.marey-body --alpha 1.5,-0.5 --out body.ply")]
     Sample(SampleArgs),
+    #[command(after_help = "Examples:
+  marey body delete athletes@1")]
     Delete(DeleteArgs),
 }
 
-/// Show what a body model is made of
+/// Show a body model: its size, its components and what it was learned from
 #[derive(Debug, clap::Args)]
 pub struct ShowArgs {
     /// The model: NAME (its latest version), NAME@VERSION, 'shipped', or a .marey-body file
+    #[arg(value_name = "MODEL")]
     which: String,
     #[command(flatten)]
     server: ServerArgs,
@@ -42,55 +50,55 @@ pub struct ShowArgs {
 
 /// Learn a body model from registered scans
 ///
-/// Scans are OBJ or PLY files with the same vertices in the same order, or vertices.npy with faces.npy. Beside them may be
-/// rig.json, skin_joints.npy and skin_weights.npy (without them the scans must have the shipped model's topology), and
-/// scans.csv and subjects.csv, which tell poses, sex and age. With --out everything is done here, without a server.
+/// Scans are OBJ or PLY files with the same vertices in the same order, or vertices.npy with faces.npy. Beside them may lie
+/// rig.json, skin_joints.npy and skin_weights.npy (without these, the scans must have the shipped model's topology), and
+/// scans.csv and subjects.csv, which give pose, sex and age. With --out the model is learned here, without a server.
 #[derive(Debug, clap::Args)]
 pub struct LearnArgs {
-    /// Name of the model: letters, digits, '.', '_' and '-'; one that exists gets a new version
+    /// Name of the model: letters, digits, '.', '_' and '-'; if it exists, it gets a new version
     name: String,
     /// Archives (zip, tar, tar.gz, tar.zst), folders or files
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Learn here and write this file
+    /// Learn here, without a server, and write this file
     #[arg(long, short, value_name = "FILE", conflicts_with = "watch")]
     out: Option<PathBuf>,
-    /// Most principal components
+    /// Most principal components to keep
     #[arg(long, default_value_t = ::body::MAX_COMPONENTS)]
     components: usize,
-    /// Metres of one unit of the scans [default: 1; found out for NPY]
+    /// Length of one unit of the scans, in metres [default: 1; for NPY it is worked out]
     #[arg(long, value_name = "METRES")]
     unit: Option<f64>,
-    /// Show the progress and wait until it is built
+    /// Show the progress and wait until it is learned
     #[arg(long, short)]
     watch: bool,
     #[command(flatten)]
     server: ServerArgs,
 }
 
-/// Make a body of a model: the most probable one with these measurements
+/// Make a body: the most probable one with these measurements
 #[derive(Debug, clap::Args)]
 pub struct SampleArgs {
     /// The model: 'shipped', a .marey-body file, or NAME or NAME@VERSION on the server
     #[arg(long, default_value = payloads::SHIPPED)]
     model: String,
-    /// Stature, metres
-    #[arg(long)]
+    /// Stature in metres
+    #[arg(long, value_name = "METRES")]
     stature: Option<f64>,
-    /// Mass, kilograms
-    #[arg(long)]
+    /// Mass in kilograms
+    #[arg(long, value_name = "KG")]
     mass: Option<f64>,
-    /// Age, years
-    #[arg(long)]
+    /// Age in years
+    #[arg(long, value_name = "YEARS")]
     age: Option<f64>,
     /// female or male
     #[arg(long, value_parser = ["female", "male"])]
     sex: Option<String>,
-    /// Coefficients in standard deviations instead of measurements
-    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, conflicts_with_all = ["stature", "mass", "age", "sex"])]
+    /// Coefficients of the components, in standard deviations, instead of measurements
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true, conflicts_with_all = ["stature", "mass", "age", "sex"])]
     alpha: Vec<f64>,
     /// File to write: .glb (with skeleton and skin), .ply or .obj
-    #[arg(long, short)]
+    #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
     server: ServerArgs,
@@ -98,10 +106,11 @@ pub struct SampleArgs {
 
 /// Delete a version of a body model
 ///
-/// Refused while it is in use; what finished runs made with it stays.
+/// Refused while it is in use. Results of finished runs stay.
 #[derive(Debug, clap::Args)]
 pub struct DeleteArgs {
     /// The model: NAME@VERSION, or its id
+    #[arg(value_name = "MODEL")]
     which: String,
     #[command(flatten)]
     server: ServerArgs,

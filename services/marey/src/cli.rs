@@ -8,10 +8,11 @@ use crate::{
     status, up, upload,
 };
 
-/// Full-body motion from a few control points.
+/// Full-body human motion from little measurement: a few points, a few cameras, or both.
 ///
-/// You measured a few points of a moving person (wrists, ankles, head, …) and want the whole body: Marey finds the most
-/// probable motion, learned from recordings like it, and gives it to you as BVH for Blender, Maya or Unity, as AMC and as CSV.
+/// You measured the paths of a few points of a moving person (wrists, ankles, hips, head), or filmed them with calibrated
+/// cameras. Marey finds the most probable motion of the whole body and writes it as BVH for Blender, Maya or Unity, and in other
+/// formats.
 #[derive(Debug, Parser)]
 #[command(name = "marey", version, max_term_width = 100, after_help = EXAMPLES)]
 pub struct Cli {
@@ -23,28 +24,29 @@ const EXAMPLES: &str = "\
 See it work, without any data of your own:
   marey demo
 
-First session:
-  marey up                                      start everything; leave it running
-  marey db build walks recordings/ --watch      learn from a folder of ASF+AMC or BVH files
+Start everything, and leave it running; the commands below go into another terminal:
+  marey up
+
+Examples:
+  marey db build walks recordings/ --watch          # learns from a folder of ASF+AMC or BVH files
   marey upload \"take 3\" points.csv skeleton.asf
   marey run \"take 3\" --database walks --watch
-  marey results RUN -o take3/                   then open take3/motion.bvh
-
-A body from calibrated cameras:
+  marey results \"take 3\" -o take3/                 # then open take3/motion.bvh
   marey upload \"take 4\" calib.toml cam*.mp4 plates/
-  marey run \"take 4\" --watch
+  marey run \"take 4\" --watch                       # a body and its motion, from calibrated cameras
+  marey results \"take 4\" -o take4/                 # then look at take4/overlay_cam01.mp4
 
-Commands that talk to a server find one started by `marey up` in this folder or above. For another:
-  export MAREY_URL=https://mocap.example MAREY_API_KEY=mk_…";
+Commands that talk to a server find the one started by `marey up` in this folder or above it. For
+another one, set MAREY_URL (such as https://mocap.example) and MAREY_API_KEY.";
 
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
     Up(up::Args),
-    /// Build and list motion databases: the recordings that Marey learns from
+    /// Build and manage motion databases: the recordings that Marey learns from
     #[command(subcommand)]
     Db(database::Command),
-    /// Learn, list and sample body models: the bodies that people may have
+    /// Learn and manage body models: the shapes that people's bodies have
     #[command(subcommand)]
     Body(body::Command),
     Upload(upload::Args),
@@ -54,16 +56,16 @@ enum Command {
     Status(status::Args),
     Cancel(status::CancelArgs),
     Live(live::Args),
-    /// Measure how well motion is reconstructed, on recordings of your own
+    /// Measure how well motion is reconstructed, on your own recordings
     Evaluate(evaluate::Args),
-    /// Measure how fast the parts are, on recordings of your own
+    /// Measure how fast the parts are, on your own recordings
     Bench(bench::Args),
     Sample(sample::Args),
     SampleCapture(sample_capture::Args),
     /// Get recorded motion from public collections
     #[command(subcommand)]
     Data(Data),
-    /// Run one service, configured by MAREY_… variables
+    /// Run one of the services, for installations on several machines
     #[command(subcommand)]
     Serve(serve::Service),
     Migrate(keys::MigrateArgs),
@@ -106,10 +108,71 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
+    use clap::{Command, CommandFactory, Parser};
+
+    use super::Cli;
+
+    /// Lines are wrapped beyond this.
+    const WIDTH: usize = 100;
 
     #[test]
     fn the_command_line_is_consistent() {
-        super::Cli::command().debug_assert();
+        Cli::command().debug_assert();
+    }
+
+    /// All commands with what stands after their help, under `Examples:` a command a line.
+    fn texts(command: &Command, path: &str, found: &mut Vec<(String, String)>) {
+        let text = command.get_after_help().map(ToString::to_string);
+        found.push((path.to_owned(), text.unwrap_or_default()));
+        for inner in command.get_subcommands() {
+            texts(inner, &format!("{path} {}", inner.get_name()), found);
+        }
+    }
+
+    fn examples(text: &str) -> impl Iterator<Item = &str> {
+        let after = text.lines().skip_while(|line| *line != "Examples:").skip(1);
+        after.take_while(|line| !line.is_empty())
+    }
+
+    /// The words of an example's last command, as a shell divides it.
+    fn words(example: &str) -> Vec<String> {
+        let command = example.split("  #").next().unwrap_or_default();
+        let command =
+            command.rsplit(" | ").next().unwrap_or_default().split(" > ").next().unwrap_or_default();
+        let quoted = command.split('"').enumerate();
+        let words = quoted.flat_map(|(index, part)| match index % 2 {
+            0 => part.split_whitespace().map(str::to_owned).collect(),
+            _ => vec![part.to_owned()],
+        });
+        words.collect()
+    }
+
+    #[test]
+    fn every_example_of_the_help_is_a_command_that_there_is() {
+        let mut found = Vec::new();
+        texts(&Cli::command(), "marey", &mut found);
+        let mut count = 0;
+        for (path, text) in &found {
+            for example in examples(text) {
+                count += 1;
+                let words = words(example);
+                assert_eq!(words.first().map(String::as_str), Some("marey"), "{path}: {example}");
+                if let Err(error) = Cli::try_parse_from(&words) {
+                    panic!("{path}: {example}\n{error}");
+                }
+            }
+        }
+        assert!(count > 60, "only {count} examples");
+    }
+
+    #[test]
+    fn no_line_after_the_help_is_broken() {
+        let mut found = Vec::new();
+        texts(&Cli::command(), "marey", &mut found);
+        for (path, text) in &found {
+            for line in examples(text) {
+                assert!(line.chars().count() <= WIDTH, "{path}: {line}");
+            }
+        }
     }
 }

@@ -12,27 +12,35 @@ use crate::{database_show, pack, watch};
 #[derive(Debug, clap::Subcommand)]
 pub enum Command {
     #[command(after_help = "Examples:
-  marey db build walks recordings/walks --watch
-  marey db build cmu subject-16.zip subject-35.tar.gz --augment mirror,warp --watch
-  marey db build mine take1.bvh take2.bvh --bvh-metres-per-unit 0.0254")]
+  marey db build walks recordings/ --watch
+  marey db build more-walks recordings/ --augment mirror,warp --watch
+  marey db build rig take1.bvh take2.bvh --bvh-metres-per-unit 0.0254 --watch   # in inches")]
     Build(BuildArgs),
     #[command(after_help = "Examples:
-  marey db add walks recordings/more --watch            walks@2: all of walks@1, and more
-  marey db add walks --without 16_15,16_16 --watch      walks@3: without two clips")]
+  marey db add walks more/ --watch                                 # all of walks@1, and more
+  marey db add walks --without synthetic1_01,synthetic1_02 --watch    # without two clips")]
     Add(AddArgs),
-    /// List motion databases, all versions
+    /// List all motion databases and their versions
+    #[command(after_help = "Examples:
+  marey db list")]
     List(ServerArgs),
+    #[command(after_help = "Examples:
+  marey db show walks
+  marey db show walks@1 --clips")]
     Show(ShowArgs),
-    #[command(after_help = "Example:
-  marey db train walks --watch && marey run \"take 3\" --database walks --method gplvm --watch")]
+    #[command(after_help = "Examples:
+  marey db train walks --watch
+  marey run \"take 3\" --database walks --method gplvm --watch")]
     Train(TrainArgs),
+    #[command(after_help = "Examples:
+  marey db delete walks@1")]
     Delete(DeleteArgs),
 }
 
 /// Build a motion database from recordings
 ///
-/// A name that exists gets a new version. Folders are searched for ASF and AMC (put each AMC beside the ASF of its
-/// performer) and BVH files, also compressed ones (.zst, .gz); archives are taken as they are.
+/// If the name exists, it gets a new version. Folders are searched for ASF, AMC and BVH files, also compressed ones (.zst, .gz);
+/// each AMC must lie beside the ASF of its performer. Archives are taken as they are.
 #[derive(Debug, clap::Args)]
 pub struct BuildArgs {
     /// Name of the database: letters, digits, '.', '_' and '-'
@@ -40,8 +48,8 @@ pub struct BuildArgs {
     /// Archives (zip, tar, tar.gz, tar.zst), folders, or ASF, AMC and BVH files
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Motion to be made from the recordings: 'mirror' (left and right exchanged), 'warp' (at 0.8 and 1.25 times the
-    /// speed), or 'warp=SPEED' for other speeds; both make about six times as much of it
+    /// More motion to make of the recordings: mirror (left and right exchanged), warp (at 0.8 and 1.25 times the speed) or
+    /// warp=SPEED; mirror,warp makes about six times as much
     #[arg(long, value_delimiter = ',', value_name = "WAYS")]
     augment: Vec<Augmentation>,
     #[command(flatten)]
@@ -50,16 +58,17 @@ pub struct BuildArgs {
 
 /// Make a new version of a motion database: with more recordings, or without some clips
 ///
-/// The version before stays as it is, and can be deleted. What was made from its recordings (see `marey db build
-/// --augment`) is made from the new ones too.
+/// The version before stays as it is, and can be deleted. What was made of its recordings (see `marey db build --augment`) is
+/// made of the new ones too.
 #[derive(Debug, clap::Args)]
 pub struct AddArgs {
-    /// The database to be added to: NAME (its latest version that is ready), NAME@VERSION, or its id
+    /// The database to add to: NAME (its latest version that is ready), NAME@VERSION, or its id
+    #[arg(value_name = "DATABASE")]
     which: String,
     /// Archives (zip, tar, tar.gz, tar.zst), folders, or ASF, AMC and BVH files
     #[arg(required_unless_present = "without")]
     files: Vec<PathBuf>,
-    /// Clips to leave out, by name (see `marey db show NAME --clips`), with all that was made from them
+    /// Clips to leave out, by name (see `marey db show NAME --clips`), with all that was made of them
     #[arg(long, value_delimiter = ',', value_name = "CLIPS")]
     without: Vec<String>,
     #[command(flatten)]
@@ -68,10 +77,10 @@ pub struct AddArgs {
 
 #[derive(Debug, clap::Args)]
 struct BuildOptions {
-    /// Divide it into so many index files, which replicas of motion-index share among themselves
+    /// Number of index files to divide it into, which replicas of motion-index share
     #[arg(long, value_name = "N")]
     shards: Option<usize>,
-    /// Length of one unit of BVH files in metres, as their format does not say it [default: 0.01]
+    /// Length of one unit of BVH files, in metres; the files don't say it [default: 0.01, centimetres]
     #[arg(long, value_name = "METRES")]
     bvh_metres_per_unit: Option<f64>,
     /// Show the progress and wait until it is built
@@ -85,6 +94,7 @@ struct BuildOptions {
 #[derive(Debug, clap::Args)]
 pub struct ShowArgs {
     /// The database: NAME (its latest version), NAME@VERSION, or its id
+    #[arg(value_name = "DATABASE")]
     which: String,
     /// List the clips too
     #[arg(long)]
@@ -95,10 +105,11 @@ pub struct ShowArgs {
 
 /// Train the model that `marey run --method gplvm` needs
 ///
-/// It is kept with this version of the database. Takes about a minute.
+/// It is kept with this version of the database. Training takes about a minute.
 #[derive(Debug, clap::Args)]
 pub struct TrainArgs {
     /// The database: NAME (its latest version that is ready), NAME@VERSION, or its id
+    #[arg(value_name = "DATABASE")]
     which: String,
     /// Parameter of the training: latent_dims=5, active=300 (poses that the model keeps), max_iterations=200
     #[arg(long, value_name = "NAME=VALUE")]
@@ -112,10 +123,11 @@ pub struct TrainArgs {
 
 /// Delete a version of a motion database
 ///
-/// Refused while it is in use; what finished runs made with it, and versions made from it, stay.
+/// Refused while it is in use. Results of finished runs, and versions made from this one, stay.
 #[derive(Debug, clap::Args)]
 pub struct DeleteArgs {
     /// The database: NAME@VERSION, or its id
+    #[arg(value_name = "DATABASE")]
     which: String,
     #[command(flatten)]
     server: ServerArgs,
@@ -268,7 +280,7 @@ fn train(args: &TrainArgs) -> anyhow::Result<()> {
     println!("training in run {}", run.id);
     if args.watch {
         watch::until_end(&client, &run.id)?;
-        println!("trained: use it by `marey run … --method gplvm`");
+        println!("trained; use it by `marey run … --method gplvm`");
     }
     Ok(())
 }

@@ -12,11 +12,11 @@ use crate::serve::runtime;
 /// An answer that takes longer is none.
 const TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Ask a service whether it is well; for probes
+/// Ask a service whether it is healthy; for probes of containers
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  marey health http://127.0.0.1:8080         the gateway: asks /readyz
-  marey health grpc://127.0.0.1:50051        a gRPC service: asks grpc.health.v1")]
+  marey health http://127.0.0.1:8080         # the gateway: asks /readyz
+  marey health grpc://127.0.0.1:50051        # a gRPC service: asks grpc.health.v1")]
 pub struct Args {
     /// http://…, https://… or grpc://…
     url: String,

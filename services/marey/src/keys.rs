@@ -24,10 +24,10 @@ pub enum Command {
     Create(CreateArgs),
 }
 
-/// Make an API key for a project, and the project if there is none of that name
+/// Make an API key for a project, and the project if it does not exist yet
 ///
-/// The key is printed once and can't be shown again. Needs the database: that of `marey up` in this folder or above, or
-/// MAREY_DATABASE_URL.
+/// The key is printed once and can't be shown again. The database must be reachable: that of `marey up` in this folder or above
+/// it, or the one named by MAREY_DATABASE_URL.
 #[derive(Debug, clap::Args)]
 pub struct CreateArgs {
     /// Name of the project: letters, digits, '.', '_' and '-'
@@ -36,7 +36,7 @@ pub struct CreateArgs {
     /// What the key allows: read, write, admin
     #[arg(long, value_delimiter = ',', default_value = "read,write")]
     scopes: Vec<Scope>,
-    /// What to remember the key by
+    /// What you will know the key by
     #[arg(long, default_value = "")]
     name: String,
     /// PostgreSQL, such as postgres://user:password@host/name

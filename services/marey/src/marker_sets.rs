@@ -18,26 +18,26 @@ const SHOWN: usize = 3;
 
 /// Show which markers a file has and which control points they make
 ///
-/// Compares the names in a C3D, TRC or CSV file with the known marker sets. `marey run` takes the best one by itself where
-/// it is clear; `--write` makes a marker map of it, a text file to edit and give to `marey run --map`.
+/// Compares the names in a C3D, TRC or CSV file with the known marker sets. `marey run` takes the best one by itself if there
+/// is no doubt; --write makes a marker map of it, a text file to edit and to give to `marey run --map`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey markers take3.c3d
   marey markers take3.c3d --write take3.toml
-  marey run \"take 3\" --database walks --map take3.toml
+  marey markers take3.c3d --map take3.toml
   marey markers --list")]
 pub struct Args {
     /// C3D, TRC or CSV file, also compressed (.gz, .zst)
     #[arg(required_unless_present = "list")]
     file: Option<PathBuf>,
-    /// Show this marker set or map instead of the one that fits best: a set's name or a file
+    /// Show this marker set, or the marker map in this file, instead of the set that fits best
     #[arg(long, value_name = "SET or FILE")]
     map: Option<String>,
-    /// Write a marker map to edit
+    /// New file to write a marker map to, for editing
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
     /// Axis of the file that points up: x, y or z [default: what the file says, else y for TRC, z for C3D]
-    #[arg(long, value_parser = axis)]
+    #[arg(long, value_parser = axis, value_name = "AXIS")]
     up: Option<Axis>,
     /// List the known marker sets
     #[arg(long)]

@@ -9,103 +9,133 @@ use serde_json::{Map, Value, json};
 
 use crate::{marker_sets, watch};
 
-/// Reconstruct a session: motion from control points, or a body and its motion from what cameras saw
+/// Reconstruct a session: a motion from control points, or a body and its motion from what cameras saw
+///
+/// What the session's files are decides how: with control points, --database names the recordings to learn from; with a
+/// calibration and videos, pictures or masks, the person's body is found and followed. Points and cameras together, or points
+/// without recordings: --kind inverse-kinematics.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey run \"take 3\" --database walks --watch
-  marey run \"take 3\" --database walks@2 --points left_wrist,right_wrist,left_ankle,right_ankle
-  marey run \"take 3\" --database walks --map plug-in-gait
-  marey run \"take 3\" --database walks --map map.toml            (see `marey markers --write`)
-  marey run \"take 3\" --database walks --map LWRA=left_wrist --map RWRA=right_wrist
-  marey run \"take 3\" --database walks --set chunk_frames=1200
-  marey run \"take 4\" --watch                                  (a session with cameras)
-  marey run \"take 4\" --cameras cam01,cam02,cam03 --camera GX010042.MP4=cam01
+  marey run \"take 3\" --database walks@1 --points left_wrist,right_wrist,left_ankle,right_ankle
+  marey run \"take 3\" --database walks --set smooth=true
+  marey run \"markers\" --database walks --map plug-in-gait     # see `marey markers --list`
+  marey run \"markers\" --database walks --map take3.toml         # see `marey markers --write`
+  marey run \"markers\" --database walks --map LWRA=left_wrist --map RWRA=right_wrist
+  marey run \"take 4\" --watch                                  # a session with cameras
+  marey run \"take 4\" --cameras cam01,cam02,cam03
   marey run \"take 4\" --set frame_rate=60 --set particles=50
-  marey run \"take 4\" --set track=false                       (the body in the first frame alone)
-  marey run \"take 5\" --kind inverse-kinematics --stature 1.78 --sex male --watch")]
+  marey run \"take 4\" --set track=false                        # the body in the first frame alone
+  marey run \"take 3\" --kind inverse-kinematics --stature 1.78 --sex male --watch")]
 pub struct Args {
-    /// The session: its name or id
+    /// The session, by name or id
     session: String,
-    /// Motion database to learn from: NAME (its latest version) or NAME@VERSION; needed for control points
-    #[arg(long, short)]
-    database: Option<String>,
-    /// Body model, for cameras: NAME (its latest version) or NAME@VERSION [default: shipped]
-    #[arg(long, value_name = "NAME", help_heading = "Cameras")]
-    body_model: Option<String>,
-    /// Cameras to use, separated by commas [default: all with pictures]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES", help_heading = "Cameras")]
-    cameras: Vec<String>,
-    /// Which camera a file is of, where its name doesn't tell: FILE=CAMERA; may be given often
-    #[arg(long = "camera", value_name = "FILE=CAMERA", help_heading = "Cameras")]
-    camera_files: Vec<String>,
-    /// How the person is told from the background: auto, plate, adaptive or mixture [default: auto, the plate if there is one]
-    #[arg(long, help_heading = "Cameras")]
-    background: Option<String>,
-    /// Metres of one unit of the calibration, where the file doesn't say it
-    #[arg(long, value_name = "METRES", help_heading = "Cameras")]
-    calibration_unit: Option<f64>,
-    /// sparse, multi-view or inverse-kinematics; to be said where a session has control points and cameras
+    /// sparse (control points and a motion database), multi-view (cameras) or inverse-kinematics [default: told by the
+    /// session's files; required if it has both control points and cameras]
     #[arg(long, value_parser = ["sparse", "multi-view", "inverse-kinematics"])]
     kind: Option<String>,
-    #[command(flatten)]
-    inverse_kinematics: InverseKinematicsArgs,
-    /// Control points to use, separated by commas [default: all in the file]
-    #[arg(long, value_delimiter = ',')]
-    points: Vec<String>,
-    /// Which markers of the file make which control point: a marker set's name (see `marey markers`), a file with a marker
-    /// map, or MARKER=POINT, which may be given often [default: the set that the names belong to]
-    #[arg(long = "map", value_name = "SET, FILE or MARKER=POINT")]
-    mapping: Vec<String>,
-    /// What the names of the performer's markers begin with, where a file has several people: Anna:
-    #[arg(long, value_name = "PREFIX")]
-    prefix: Option<String>,
-    /// Axis of a TRC or C3D file, or of a calibration, that points up: x, y or z [default: what the file says, else y for TRC,
-    /// z for C3D]
-    #[arg(long, value_parser = ["x", "y", "z"])]
-    up: Option<String>,
-    /// Metres of one unit of BVH files [default: 0.01, centimetres]
-    #[arg(long, value_name = "METRES")]
-    bvh_unit: Option<f64>,
-    /// local-regression, nearest, lpca, lpcr or gplvm [default: local-regression]; docs/methods.md
-    #[arg(long)]
-    method: Option<String>,
-    /// Frames of history to look at
-    #[arg(long)]
-    window: Option<u32>,
-    /// Neighbours to learn from
-    #[arg(long)]
-    neighbours: Option<u32>,
-    /// Any other parameter of the method: NAME=VALUE; may be given often
+    /// Any other parameter of the method; may be given several times
     #[arg(long = "set", value_name = "NAME=VALUE")]
     parameters: Vec<String>,
     /// Show the progress and wait for the end
     #[arg(long, short)]
     watch: bool,
     #[command(flatten)]
+    points: PointsArgs,
+    #[command(flatten)]
+    sparse: SparseArgs,
+    #[command(flatten)]
+    cameras: CameraArgs,
+    #[command(flatten)]
+    inverse_kinematics: InverseKinematicsArgs,
+    #[command(flatten)]
     server: ServerArgs,
 }
 
-/// Options that make a run one by inverse kinematics.
+/// Options on the file of measured points.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Measured points")]
+struct PointsArgs {
+    /// Control points to use, separated by commas [default: all in the file]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    points: Vec<String>,
+    /// Which markers of the file make which control point: the name of a marker set (see `marey markers --list`), a file with a
+    /// marker map, or MARKER=POINT, which may be given several times [default: the marker set that the names belong to]
+    #[arg(long = "map", value_name = "SET, FILE or MARKER=POINT")]
+    mapping: Vec<String>,
+    /// What the names of the performer's markers begin with, if the file has several people, such as Anna:
+    #[arg(long, value_name = "PREFIX")]
+    prefix: Option<String>,
+    /// Axis of the TRC or C3D file, or of the calibration, that points up: x, y or z [default: as the file says, else y for TRC
+    /// and z for C3D]
+    #[arg(long, value_parser = ["x", "y", "z"], value_name = "AXIS")]
+    up: Option<String>,
+}
+
+/// Options of a run that learns from a motion database.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Control points and a motion database")]
+struct SparseArgs {
+    /// Motion database to learn from: NAME (its latest version) or NAME@VERSION
+    #[arg(long, short, value_name = "NAME")]
+    database: Option<String>,
+    /// local-regression, nearest, lpca, lpcr or gplvm [default: local-regression]; see docs/methods.md
+    #[arg(long)]
+    method: Option<String>,
+    /// Last poses that are compared with the recordings [default: 2]
+    #[arg(long, value_name = "FRAMES")]
+    window: Option<u32>,
+    /// Moments of the recordings that each frame is learned from, the most similar ones [default: 64]
+    #[arg(long, value_name = "NUMBER")]
+    neighbours: Option<u32>,
+    /// Length of one unit of BVH files, in metres [default: 0.01, centimetres]
+    #[arg(long, value_name = "METRES")]
+    bvh_unit: Option<f64>,
+}
+
+/// Options of a session with cameras.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Cameras")]
+struct CameraArgs {
+    /// Cameras to use, separated by commas [default: all that saw something]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    cameras: Vec<String>,
+    /// Which camera a file is from, if its name doesn't tell; may be given several times
+    #[arg(long = "camera", value_name = "FILE=CAMERA")]
+    camera_files: Vec<String>,
+    /// Body model: NAME (its latest version) or NAME@VERSION [default: shipped]
+    #[arg(long, value_name = "NAME")]
+    body_model: Option<String>,
+    /// How the person is told from the background: auto, plate, adaptive or mixture [default: auto, which takes the plate if
+    /// there is one]
+    #[arg(long)]
+    background: Option<String>,
+    /// Length of one unit of the calibration, in metres, if its file doesn't say it
+    #[arg(long, value_name = "METRES")]
+    calibration_unit: Option<f64>,
+}
+
+/// Options of a run by inverse kinematics.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Inverse kinematics")]
 struct InverseKinematicsArgs {
     /// plain, priority, image-constrained, extended, image-first or reach-then-image-then-posture [default: image-constrained
-    /// with cameras, else priority]
+    /// with cameras, otherwise priority]
     #[arg(long)]
     solver: Option<String>,
-    /// Most steps of one solve [default: 15]
+    /// Most steps for each frame [default: 15]
     #[arg(long)]
     steps: Option<u32>,
-    /// Frames a second that are solved [default: the cameras', or those of the file of points]
+    /// Frames to solve a second [default: as many as the cameras have, otherwise as the file of points]
     #[arg(long, value_name = "HZ")]
     frame_rate: Option<f64>,
-    /// The person's height, metres
+    /// The person's stature in metres
     #[arg(long, value_name = "METRES")]
     stature: Option<f64>,
-    /// The person's mass, kilograms
+    /// The person's mass in kilograms
     #[arg(long, value_name = "KG")]
     mass: Option<f64>,
-    /// The person's age, years
+    /// The person's age in years
     #[arg(long, value_name = "YEARS")]
     age: Option<f64>,
     /// female or male
@@ -159,33 +189,33 @@ fn warnings(client: &Client, run: &str) -> anyhow::Result<Vec<String>> {
 fn request(args: &Args) -> anyhow::Result<Value> {
     let mut request = json!({});
     let named = [
-        ("motion_database", args.database.as_ref().map(|name| json!(name))),
+        ("motion_database", args.sparse.database.as_ref().map(|name| json!(name))),
         ("kind", args.kind.as_ref().map(|kind| json!(kind))),
         ("inverse_kinematics", args.inverse_kinematics.request()),
-        ("body_model", args.body_model.as_ref().map(|name| json!(name))),
-        ("cameras", (!args.cameras.is_empty()).then(|| json!(args.cameras))),
+        ("body_model", args.cameras.body_model.as_ref().map(|name| json!(name))),
+        ("cameras", (!args.cameras.cameras.is_empty()).then(|| json!(args.cameras.cameras))),
         (
             "camera_files",
-            (!args.camera_files.is_empty())
-                .then(|| pairs(&args.camera_files, |name| name.into()))
+            (!args.cameras.camera_files.is_empty())
+                .then(|| pairs(&args.cameras.camera_files, |name| name.into()))
                 .transpose()?,
         ),
-        ("background", args.background.as_ref().map(|kind| json!(kind))),
-        ("metres_per_unit", args.calibration_unit.map(Value::from)),
-        ("points", (!args.points.is_empty()).then(|| json!(args.points))),
-        ("marker_prefix", args.prefix.as_ref().map(|prefix| json!(prefix))),
-        ("up", args.up.as_ref().map(|axis| json!(axis))),
-        ("bvh_metres_per_unit", args.bvh_unit.map(Value::from)),
-        ("method", args.method.as_ref().map(|m| json!(m))),
-        ("window", args.window.map(Value::from)),
-        ("neighbours", args.neighbours.map(Value::from)),
+        ("background", args.cameras.background.as_ref().map(|kind| json!(kind))),
+        ("metres_per_unit", args.cameras.calibration_unit.map(Value::from)),
+        ("points", (!args.points.points.is_empty()).then(|| json!(args.points.points))),
+        ("marker_prefix", args.points.prefix.as_ref().map(|prefix| json!(prefix))),
+        ("up", args.points.up.as_ref().map(|axis| json!(axis))),
+        ("bvh_metres_per_unit", args.sparse.bvh_unit.map(Value::from)),
+        ("method", args.sparse.method.as_ref().map(|m| json!(m))),
+        ("window", args.sparse.window.map(Value::from)),
+        ("neighbours", args.sparse.neighbours.map(Value::from)),
         (
             "parameters",
             // a number or true where it reads as one, else a word
             (!args.parameters.is_empty()).then(|| values(&args.parameters)).transpose()?,
         ),
     ];
-    for (name, value) in marker_sets::request(&args.mapping)? {
+    for (name, value) in marker_sets::request(&args.points.mapping)? {
         request[name] = value;
     }
     for (name, value) in named {

@@ -15,6 +15,8 @@ use sample_motion::{Action, DrawOptions, FRAME_RATE, Model};
 use serde_json::{Value, json};
 use vision::scene::{Ring, silhouettes};
 
+use crate::words::counted;
+
 /// Frames of drawn motion from one picture to the next: 30 pictures a second.
 const STEP: usize = 2;
 /// Frames of the truth from one mesh to the next.
@@ -29,28 +31,28 @@ const STATURES_M: [f64; 5] = [1.58, 1.66, 1.73, 1.79, 1.86];
 
 /// Write a synthetic multi-camera capture to try things with
 ///
-/// A body of the shipped model moves as a drawn trial does, before a ring of cameras: calibration, a silhouette a frame and
-/// camera, and the true joints and meshes. It is synthetic: the body is one that the model knows, and its silhouettes are
-/// exact.
+/// A body of the shipped model moves as in a drawn trial, inside a ring of cameras. Written are the calibration, a silhouette for
+/// each frame and camera, and the true joints and meshes. It is synthetic: the body is one that the model knows, and its
+/// silhouettes are exact.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:
-  marey sample-capture --out capture/ --cameras 6 --action walk
+#[command(after_help = "Examples:
+  marey sample-capture --out capture/ --frames 24
   marey upload \"synthetic walk\" capture/calibration.json capture/silhouettes/
-  marey run \"synthetic walk\" --watch")]
+  marey run \"synthetic walk\" --set frame_rate=30 --watch      # silhouettes don't say their frame rate")]
 pub struct Args {
     /// Folder to write to
     #[arg(long)]
     out: PathBuf,
-    /// Cameras, in a circle around the person
+    /// Number of cameras, in a circle around the person
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(2..=32))]
     cameras: u32,
-    /// Frames, at 30 a second
+    /// Number of frames, at 30 a second
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
     /// walk, run, jump or boxing
     #[arg(long, default_value = "walk")]
     action: Action,
-    /// Another seed gives another person and motion, the same seed the same
+    /// Another seed draws another person and motion, the same seed the same ones
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -67,9 +69,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     capture.write(&args.out, || bar.inc(1))?;
     bar.finish_and_clear();
     println!(
-        "wrote {} frames of {} cameras to {}: synthetic, with the truth in groundtruth/",
-        args.frames,
-        args.cameras,
+        "wrote {} of {} to {}: synthetic, with the truth in groundtruth/",
+        counted(args.frames.into(), "frame"),
+        counted(args.cameras.into(), "camera"),
         args.out.display()
     );
     Ok(())

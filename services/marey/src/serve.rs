@@ -8,28 +8,28 @@ use service::config::{TelemetryConfig, Variables, environment};
 pub enum Service {
     /// The HTTP interface
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:8080), MAREY_MAX_UPLOAD_BYTES (536870912),
-    /// MAREY_BOOTSTRAP_KEY and MAREY_RECONSTRUCTION (http://127.0.0.1:50052, where live streams go) may be.
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:8080), MAREY_MAX_UPLOAD_BYTES (536870912),
+    /// MAREY_BOOTSTRAP_KEY and MAREY_RECONSTRUCTION (http://127.0.0.1:50052, where live streams go) may be set.
     Gateway,
     /// Builds motion databases and answers queries on them
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50051), MAREY_WORKER_CONCURRENCY and others
-    /// may be.
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:50051), MAREY_WORKER_CONCURRENCY and others
+    /// may be set.
     MotionIndex,
     /// Reconstructs motion
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50052), MAREY_WORKER_CONCURRENCY and others
-    /// may be.
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:50052), MAREY_WORKER_CONCURRENCY and others
+    /// may be set.
     Reconstruction,
     /// Learns body models, makes silhouettes, finds pose and shape in them, draws what was found over videos
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50053), MAREY_WORKER_CONCURRENCY and others
-    /// may be. Videos need the program ffmpeg and room for a copy in TMPDIR.
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:50053), MAREY_WORKER_CONCURRENCY and others
+    /// may be set. Videos need the program ffmpeg and room for a copy in TMPDIR.
     ShapeInit,
     /// Follows people through the frames of sessions with cameras
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set; MAREY_LISTEN (127.0.0.1:50054), MAREY_WORKER_CONCURRENCY and others
-    /// may be.
+    /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:50054), MAREY_WORKER_CONCURRENCY and others
+    /// may be set.
     Refinement,
 }
 

@@ -25,21 +25,22 @@ const GRACE: Duration = Duration::from_secs(5);
 
 /// Start everything on this machine
 ///
-/// PostgreSQL, the HTTP interface and the services that do the work, in one process. Everything is kept in the data folder;
-/// start again and it is all there. Ctrl-C stops it. It is reachable from this machine only, unless --listen says otherwise.
+/// PostgreSQL, the HTTP interface and the services that do the work, in one process. Everything is kept in the data folder:
+/// when you start it again, all is there again. Ctrl-C stops it. It can be reached from this machine alone, unless --listen says
+/// otherwise.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Examples:
   marey up
   marey up --data-dir /srv/marey --listen 0.0.0.0:8080 --workers 8")]
 pub struct Args {
-    /// Where everything is kept
-    #[arg(long, default_value = DEFAULT_DATA_DIR)]
+    /// Folder in which everything is kept
+    #[arg(long, default_value = DEFAULT_DATA_DIR, value_name = "DIR")]
     pub data_dir: PathBuf,
-    /// Address of the HTTP interface; port 0 takes a free one
-    #[arg(long, default_value = "127.0.0.1:8080")]
+    /// Address and port of the HTTP interface; port 0 takes a free one
+    #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDRESS")]
     pub listen: SocketAddr,
-    /// Jobs at once [default: number of cores]
-    #[arg(long)]
+    /// Jobs to work on at the same time [default: number of cores]
+    #[arg(long, value_name = "NUMBER")]
     pub workers: Option<usize>,
 }
 
