@@ -81,7 +81,8 @@ impl MarkerMap {
             let all = self.points().flat_map(names_of).collect::<BTreeSet<_>>();
             let markers = all.into_iter().collect::<Vec<_>>().join(", ");
             let has = trajectories.names().join(", ");
-            return Err(Error::NoMarkers { point: "of the map".to_owned(), markers, has });
+            let map = if self.name.is_empty() { "the marker map" } else { &self.name }.to_owned();
+            return Err(Error::NoneOfMap { map, markers, has });
         }
         let frames = trajectories.num_frames();
         let names = made.iter().map(|(point, _)| point.name.clone()).collect();
@@ -208,6 +209,16 @@ mod tests {
             message,
             "control point root is made of nowhere, none of which is in the file; it has S:A"
         );
+    }
+
+    #[test]
+    fn a_file_without_any_marker_of_the_map_is_refused_with_both() {
+        let map = map("[points]\nhead = 'T'\nroot = ['A', 'B']");
+        let message = map.apply(&file(&["x", "y"], &[0.0, 1.0]), &[]).unwrap_err().to_string();
+        assert_eq!(message, "the file has none of the marker map's markers (A, B, T); it has x, y");
+        let preset = crate::preset("cmu-41").unwrap().apply(&file(&["x", "y"], &[0.0, 1.0]), &[]);
+        let message = preset.unwrap_err().to_string();
+        assert!(message.starts_with("the file has none of cmu-41's markers ("), "{message}");
     }
 
     #[test]

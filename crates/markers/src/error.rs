@@ -36,10 +36,18 @@ pub enum Error {
         /// names in the file
         has: String,
     },
+    /// None of the markers of a whole map is in the file.
+    #[error("the file has none of {map}'s markers ({markers}); it has {has}")]
+    NoneOfMap {
+        /// the map: its name, or "the marker map"
+        map: String,
+        /// its markers
+        markers: String,
+        /// names in the file
+        has: String,
+    },
     /// A name of a map stands for several of the file.
-    #[error(
-        "marker {name} of the map may be any of {found} in the file; say which with a prefix or with the whole name"
-    )]
+    #[error("marker {name} may be any of {found} in the file; say which by a prefix or by the whole name")]
     Unclear {
         /// the marker's name in the map
         name: String,
@@ -48,7 +56,7 @@ pub enum Error {
     },
     /// The file's names belong to no preset.
     #[error(
-        "the file's markers belong to no known marker set ({nearest}); say what they are with a marker map"
+        "the file's markers belong to no known marker set ({nearest}); say what they are by a marker map"
     )]
     Unknown {
         /// what came nearest

@@ -26,6 +26,7 @@ pub use apply::{Mapped, MappedPoint, upside_down};
 pub use detect::{Fit, PointFit, detect, fits};
 pub use error::Error;
 pub use map::{Group, MarkerMap, Point};
+pub use names::find_name;
 pub use presets::{preset, presets};
 pub use template::template;
 

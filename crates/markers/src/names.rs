@@ -71,6 +71,27 @@ pub(crate) fn prefixes(all: &[String]) -> Vec<String> {
     found.into_iter().map(str::to_owned).collect()
 }
 
+/// The name in a file that is meant by `name`: the same, else the only one that differs from it in nothing but a prefix, case
+/// and separators.
+///
+/// # Errors
+/// If several names of the file are meant.
+pub fn find_name<'a>(name: &str, all: &'a [String]) -> Result<Option<&'a str>> {
+    if let Some(same) = all.iter().find(|own| *own == name) {
+        return Ok(Some(same));
+    }
+    let mut found = BTreeSet::new();
+    for prefix in prefixes(all) {
+        found.extend(FileNames::new(all, &prefix).find(name)?);
+    }
+    let names: Vec<&str> = found.into_iter().map(|index| all[index].as_str()).collect();
+    match names[..] {
+        [] => Ok(None),
+        [own] => Ok(Some(own)),
+        _ => Err(Error::Unclear { name: name.to_owned(), found: names.join(", ") }),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -87,6 +108,18 @@ mod tests {
         assert_eq!(prefixes(&names(&["é_a", "è_a"])), [""]);
         assert_eq!(prefixes(&names(&["a_b"])), [""]);
         assert_eq!(prefixes(&[]), [""]);
+    }
+
+    #[test]
+    fn a_name_is_found_without_its_prefix() {
+        let all = names(&["Anna:LWRA", "Anna:RWRA", "LWRA_2"]);
+        assert_eq!(find_name("Anna:LWRA", &all), Ok(Some("Anna:LWRA")));
+        assert_eq!(find_name("lwra", &all), Ok(Some("Anna:LWRA")));
+        assert_eq!(find_name("head", &all), Ok(None));
+        let two = names(&["Anna:LWRA", "Ben:LWRA", "LWRA"]);
+        assert_eq!(find_name("LWRA", &two), Ok(Some("LWRA")));
+        let message = find_name("lwra", &two[..2]).unwrap_err().to_string();
+        assert!(message.contains("Anna:LWRA, Ben:LWRA"), "{message}");
     }
 
     #[test]

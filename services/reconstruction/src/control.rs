@@ -75,7 +75,7 @@ pub(crate) fn choose(
             return as_named(file, trajectories, wanted, skeleton, warnings);
         }
         Markers::Auto => (detected(file, names, warnings).map_err(in_file)?, false),
-        Markers::Pairs(pairs) => (map_of(pairs, names, wanted, file)?, true),
+        Markers::Pairs(pairs) => (from_pairs(pairs, names, wanted, file)?, true),
         Markers::Preset(map) => (map.clone(), false),
         Markers::Map(map) => (map.clone(), true),
     };
@@ -133,23 +133,30 @@ fn detected(file: &str, names: &[String], warnings: &mut Vec<String>) -> markers
     Ok(fit.with_prefix())
 }
 
-/// Pairs as a map, with the points that are wanted and that the file has under their own names.
-fn map_of(
+/// Pairs as a map, with the points that are wanted and that the file has under their own names. Markers may be named without
+/// their prefix.
+fn from_pairs(
     pairs: &BTreeMap<String, String>,
     names: &[String],
     wanted: &[String],
     file: &str,
 ) -> Result<MarkerMap, InputError> {
-    if let Some(name) = pairs.keys().find(|name| !names.contains(name)) {
-        return Err(InputError::Mapping { name: name.clone(), file: file.to_owned(), has: names.join(", ") });
+    let mut markers = Vec::with_capacity(pairs.len());
+    for (name, point) in pairs {
+        let found = markers::find_name(name, names)
+            .map_err(|source| InputError::Markers { file: file.to_owned(), source })?;
+        let Some(marker) = found else {
+            let has = names.join(", ");
+            return Err(InputError::Mapping { name: name.clone(), file: file.to_owned(), has });
+        };
+        markers.push((marker, point.as_str()));
     }
-    if let Some(name) = pairs.values().find(|name| names.contains(name) && !pairs.contains_key(*name)) {
+    let is_mapped = |name: &String| markers.iter().any(|(marker, _)| marker == name);
+    if let Some(name) = pairs.values().find(|name| names.contains(name) && !is_mapped(name)) {
         return Err(InputError::MappedTwice { name: name.clone(), file: file.to_owned() });
     }
     let own =
         wanted.iter().filter(|name| names.contains(name) && !pairs.values().any(|point| point == *name));
     let own = own.map(|name| (name.as_str(), name.as_str()));
-    Ok(MarkerMap::from_pairs(
-        pairs.iter().map(|(marker, point)| (marker.as_str(), point.as_str())).chain(own),
-    ))
+    Ok(MarkerMap::from_pairs(markers.into_iter().chain(own)))
 }

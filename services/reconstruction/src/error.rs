@@ -39,7 +39,7 @@ pub enum InputError {
         expected: &'static str,
     },
     /// The mapping names something that is not in the file.
-    #[error("mapping has {name:?}, which is not in {file}; it has {has}")]
+    #[error("{name:?} of the mapping is not in {file}, which has {has}")]
     Mapping {
         /// Name in the mapping.
         name: String,
@@ -84,12 +84,18 @@ pub enum InputError {
     #[error(transparent)]
     Points(#[from] kinematics::Error),
     /// More points than a figure may have.
-    #[error("found {found} measured points, expected at most {limit}: choose some by name with points")]
+    #[error(
+        "{file} has {found} points of the body, of which at most {limit} can be used; choose some: --points {some}"
+    )]
     TooManyPoints {
+        /// Name of the file.
+        file: String,
         /// How many there are.
         found: usize,
         /// Most points.
         limit: usize,
+        /// Names of some of them, separated by commas.
+        some: String,
     },
     /// Something of a request is out of range.
     #[error("{field} is {found}, expected {expected}")]

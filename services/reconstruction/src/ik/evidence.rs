@@ -54,7 +54,14 @@ pub(super) fn read(
     }
     let chosen = control::choose(&file, trajectories, &markers, &wanted, skeleton, warnings)?;
     if chosen.points.len() > MAX_POINTS {
-        return Err(InputError::TooManyPoints { found: chosen.points.len(), limit: MAX_POINTS });
+        let some: Vec<&str> =
+            chosen.points.iter().take(MAX_POINTS).map(|point| point.name.as_str()).collect();
+        return Err(InputError::TooManyPoints {
+            file,
+            found: chosen.points.len(),
+            limit: MAX_POINTS,
+            some: some.join(","),
+        });
     }
     Ok(chosen)
 }
