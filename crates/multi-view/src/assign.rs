@@ -41,7 +41,7 @@ pub fn assign(names: &[String], cameras: &[String], map: &BTreeMap<String, Strin
     check_map(names, cameras, map)?;
     let mut assigned: Vec<Assigned> = Vec::new();
     for (source, name) in names.iter().enumerate() {
-        let camera = match map.get(name).and_then(|wanted| cameras.iter().position(|c| c == wanted)) {
+        let camera = match map.get(name).and_then(|wanted| find_camera(wanted, cameras)) {
             Some(camera) => camera,
             None => by_name(name, cameras)?,
         };
@@ -54,12 +54,19 @@ pub fn assign(names: &[String], cameras: &[String], map: &BTreeMap<String, Strin
     Ok(assigned)
 }
 
+/// The camera that a person calls `name`: the one of that name, else, as for files, the one whose name differs from it in case,
+/// signs and zeros only, else the only one with the same number. `None` if that is none, or several.
+pub fn find_camera(name: &str, cameras: &[String]) -> Option<usize> {
+    let same = cameras.iter().position(|camera| camera == name);
+    same.or_else(|| by_name(name, cameras).ok())
+}
+
 fn check_map(names: &[String], cameras: &[String], map: &BTreeMap<String, String>) -> Result<()> {
     for (name, camera) in map {
         if !names.contains(name) {
             return Err(Error::Map { found: name.clone(), expected: format!("one of {}", listed(names)) });
         }
-        if !cameras.contains(camera) {
+        if find_camera(camera, cameras).is_none() {
             return Err(Error::Map {
                 found: camera.clone(),
                 expected: format!("a camera: {}", listed(cameras)),
@@ -175,12 +182,26 @@ mod tests {
     }
 
     #[test]
+    fn cameras_are_found_as_leniently_as_their_files() {
+        let cameras = ["cam1", "cam2", "Kinect left"].map(str::to_owned);
+        for (name, expected) in [("cam1", 0), ("cam01", 0), ("CAM_2", 1), ("2", 1), ("kinect-left", 2)] {
+            assert_eq!(find_camera(name, &cameras), Some(expected), "{name}");
+        }
+        assert_eq!(find_camera("cam3", &cameras), None);
+        // the very name goes before what is like it
+        let alike = ["cam1", "cam01"].map(str::to_owned);
+        assert_eq!(find_camera("cam01", &alike), Some(1));
+        assert_eq!(find_camera("cam001", &alike), None, "either may be meant");
+    }
+
+    #[test]
     fn the_map_says_what_names_do_not() {
         let names = ["gopro.mp4".to_owned(), "cam2.mp4".to_owned()];
         let cameras = ["cam1".to_owned(), "cam2".to_owned()];
         let map = |from: &str, to: &str| BTreeMap::from([(from.to_owned(), to.to_owned())]);
         let assigned = assign(&names, &cameras, &map("gopro.mp4", "cam1")).unwrap();
         assert_eq!(assigned[0], Assigned { source: 0, camera: 0 });
+        assert_eq!(assign(&names, &cameras, &map("gopro.mp4", "Cam 01")).unwrap(), assigned);
         assert!(
             assign(&names, &cameras, &map("gopro.mp4", "cam9")).unwrap_err().to_string().contains("cam9")
         );

@@ -27,7 +27,7 @@ mod matches;
 mod packed;
 mod parameters;
 
-pub use assign::{Assigned, assign};
+pub use assign::{Assigned, assign, find_camera};
 pub use camera::CameraRecord;
 pub use clip::{ClipWriter, SilhouetteClip};
 pub use error::Error;

@@ -4,6 +4,7 @@ use axum::{
     body::Bytes,
     extract::{
         FromRequest, FromRequestParts, Request,
+        path::ErrorKind,
         rejection::{BytesRejection, PathRejection, QueryRejection},
     },
     http::{StatusCode, header},
@@ -66,6 +67,15 @@ fn check_is_json(headers: &axum::http::HeaderMap) -> Result<(), Error> {
     }
 }
 
+/// What the id in a path names.
+fn named_by(key: &str) -> &'static str {
+    match key {
+        "run_id" => "run",
+        "session_id" => "session",
+        _ => "item",
+    }
+}
+
 impl From<PathRejection> for Error {
     fn from(rejection: PathRejection) -> Self {
         match rejection {
@@ -73,7 +83,11 @@ impl From<PathRejection> for Error {
             PathRejection::FailedToDeserializePathParams(failed)
                 if failed.status() == StatusCode::BAD_REQUEST =>
             {
-                Self::NotFound { what: "thing at", which: failed.body_text() }
+                let (what, which) = match failed.kind() {
+                    ErrorKind::ParseErrorAtKey { key, value, .. } => (named_by(key), value.clone()),
+                    other => ("path", other.to_string()),
+                };
+                Self::NotFound { what, which }
             }
             other => Self::Internal(format!("path: {}", other.body_text())),
         }

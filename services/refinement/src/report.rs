@@ -81,7 +81,7 @@ pub(crate) fn doubts(finished: &Finished) -> Vec<String> {
             most_often(frames).map_or(String::new(), |limb| format!(", most often the {}", limb.name()));
         doubts.push(format!(
             "in {:.0} % of the frames a limb does not fit the silhouettes{most} ({}): look at the overlay videos there (red) and \
-             correct those frames; more cameras, better silhouettes or more particles (--set particles=100) help",
+             do not trust those frames; more cameras, better silhouettes or more particles (--set particles=100) help",
             100.0 * misaligned.len() as f64 / frames.len() as f64,
             ranges(&misaligned)
         ));

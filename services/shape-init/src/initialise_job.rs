@@ -273,7 +273,7 @@ fn frame_rate(parameters: &Parameters, cameras: &[CameraReport], warnings: &mut 
     let Some(rate) = rates().next() else {
         if parameters.track {
             warnings.push(format!(
-                "no file tells the frame rate: {FRAME_RATE} frames a second are assumed; say it with --set frame_rate=60"
+                "no file states the frame rate: {FRAME_RATE} frames a second are assumed; state another by --set frame_rate=…"
             ));
         }
         return FRAME_RATE;

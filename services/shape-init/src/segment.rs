@@ -44,6 +44,8 @@ pub(crate) struct Made {
 struct Packer<'a, S> {
     parameters: &'a Parameters,
     frame: usize,
+    /// frames of the whole source, if it says so
+    count: Option<usize>,
     expected: Option<usize>,
     clip: Option<ClipWriter>,
     /// where points are looked for in the pictures
@@ -62,6 +64,7 @@ impl<'a, S: Sink> Packer<'a, S> {
         Self {
             parameters,
             frame: parameters.first_frame,
+            count,
             expected,
             clip: None,
             features: None,
@@ -115,12 +118,13 @@ impl<'a, S: Sink> Packer<'a, S> {
     /// Ends the last clip; refuses to end before the first frame.
     fn finish(mut self, name: &str) -> Result<usize, InputError> {
         if self.frame == self.parameters.first_frame {
-            return Err(FileError::unexpected(
-                name,
-                "fewer frames than that",
-                format!("at least first_frame + 1 = {}", self.parameters.first_frame + 1),
-            )
-            .into());
+            let first = self.parameters.first_frame;
+            let found = match self.count {
+                Some(count) => format!("{count} frames"),
+                None => format!("no frame {first}"),
+            };
+            let expected = format!("more than {first}, which is first_frame");
+            return Err(FileError::unexpected(name, found, expected).into());
         }
         self.close();
         Ok(self.frame)

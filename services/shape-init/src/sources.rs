@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bytes::Bytes;
-use multi_view::assign;
+use multi_view::{assign, find_camera};
 use payloads::{InputFile, Members, Source, SourceKind};
 use service::FileError;
 
@@ -83,13 +83,15 @@ pub(crate) fn match_cameras(
     map: &BTreeMap<String, String>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<CameraSources>, InputError> {
-    if let Some(unknown) = asked.iter().find(|name| !cameras.contains(name)) {
-        return Err(FileError::unexpected("cameras", format!("{unknown:?}"), cameras.join(", ")).into());
-    }
+    let asked = asked.iter().map(|name| {
+        find_camera(name, cameras)
+            .ok_or_else(|| FileError::unexpected("cameras", format!("{name:?}"), cameras.join(", ")))
+    });
+    let asked: Vec<usize> = asked.collect::<Result<_, _>>()?;
     let (plates, pictures): (Vec<Source>, Vec<Source>) =
         sources.into_iter().partition(|source| source.kind == SourceKind::Plate);
-    let known = |of: &[Source]| -> (Vec<String>, BTreeMap<String, String>) {
-        let names: Vec<String> = of.iter().map(|source| source.name.clone()).collect();
+    let known = |sources: &[Source]| -> (Vec<String>, BTreeMap<String, String>) {
+        let names: Vec<String> = sources.iter().map(|source| source.name.clone()).collect();
         let own = map.iter().filter(|(name, _)| names.contains(name));
         let own = own.map(|(name, camera)| (name.clone(), camera.clone())).collect();
         (names, own)
@@ -108,18 +110,18 @@ pub(crate) fn match_cameras(
         .map(|a| CameraSources { camera: a.camera, pictures: pictures[a.source].clone(), plate: None })
         .collect();
     for assigned in assign(&plate_names, cameras, &plate_map)? {
-        match found.iter_mut().find(|of| of.camera == assigned.camera) {
-            Some(of) => of.plate = Some(plates[assigned.source].clone()),
+        match found.iter_mut().find(|seen| seen.camera == assigned.camera) {
+            Some(seen) => seen.plate = Some(plates[assigned.source].clone()),
             None => warnings.push(format!("{}: its camera has no pictures", plate_names[assigned.source])),
         }
     }
-    found.sort_by_key(|of| of.camera);
+    found.sort_by_key(|seen| seen.camera);
     if !asked.is_empty() {
-        found.retain(|of| asked.contains(&cameras[of.camera]));
+        found.retain(|seen| asked.contains(&seen.camera));
     }
     for (index, name) in cameras.iter().enumerate() {
-        let is_missing = found.iter().all(|of| of.camera != index);
-        if is_missing && asked.contains(name) {
+        let is_missing = found.iter().all(|seen| seen.camera != index);
+        if is_missing && asked.contains(&index) {
             return Err(FileError::unexpected(
                 format!("camera {name}"),
                 "no video, pictures or masks",
