@@ -8,6 +8,7 @@
 //! - [`limbs`]: where inverse kinematics finds elbows and knees; [`recovery`]: how often a particle search finds a disturbed
 //!   pose again, with the [`training_poses`] of its prior.
 //! - [`Proportion`], [`PairedDifference`]: how often something succeeds, and whether one way does so oftener than another.
+//! - [`Picture`]: measured points, the motion found and the true one, to look at.
 //! - [`summarise`] into [`Row`]s, [`tables`] of them beside the papers' own, and HTML reports ([`report`]).
 
 mod calibration;
@@ -20,6 +21,7 @@ pub mod limbs;
 mod metrics;
 mod models;
 mod performer;
+mod picture;
 mod proportion;
 mod protocol;
 pub mod recovery;
@@ -42,6 +44,7 @@ pub use metrics::{Comparison, Errors, JointErrors, compare, compare_in_detail};
 pub use performer::{
     FeetResult, FootNumbers, SkeletonResult, SkeletonSource, SkeletonTrial, evaluate_feet, evaluate_skeletons,
 };
+pub use picture::Picture;
 pub use proportion::{PairedDifference, Proportion, Verdict};
 pub use protocol::{ControlSet, Protocol};
 pub use shape::{Body, Distribution, ShapeErrors, shape_errors};
