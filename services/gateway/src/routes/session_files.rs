@@ -75,7 +75,9 @@ pub(super) async fn put_in_session(
 ) -> Result<(StatusCode, Json<File>)> {
     names::check_file_name(&name)?;
     let role = query.role.or_else(|| FileRole::of_session_file(&name)).ok_or_else(|| {
-        Error::Unprocessable(format!("the role of {name:?} can't be told from its name; say ?role="))
+        Error::Unprocessable(format!(
+            "the role of {name:?} can't be told from its name; give it: --role in `marey upload`, ?role= in a request"
+        ))
     })?;
     if !role.fits_session_file(&name) {
         return Err(Error::Unprocessable(format!(
