@@ -67,7 +67,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// Uploads one file and says so.
-pub fn put(client: &Client, session: &Session, name: &str, role: Option<&str>, file: File) -> anyhow::Result<()> {
+fn put(client: &Client, session: &Session, name: &str, role: Option<&str>, file: File) -> anyhow::Result<()> {
     let stored = send(client, session, name, role, file)?;
     println!(
         "uploaded {name} as {} ({} bytes)",

@@ -34,9 +34,20 @@ pub struct Progress {
 /// If it fails or is cancelled, or the server can't be reached any more.
 pub fn until_end(client: &Client, run_id: &str) -> anyhow::Result<()> {
     let mut display = Display::new();
-    let end = follow(client, run_id, |progress| display.show(progress));
+    let end = until_end_with(client, run_id, |progress| {
+        let phrase = if progress.phrase.is_empty() { &progress.state } else { &progress.phrase };
+        display.show(progress.progress, phrase);
+    });
     display.close();
-    let end = end?;
+    end
+}
+
+/// Waits for the end of a run and tells how far it is.
+///
+/// # Errors
+/// As [`until_end`].
+pub fn until_end_with(client: &Client, run_id: &str, show: impl FnMut(&Progress)) -> anyhow::Result<()> {
+    let end = follow(client, run_id, show)?;
     match end.state.as_str() {
         "succeeded" => Ok(()),
         "failed" => bail!("the run failed: {}", end.error.unwrap_or_default()),
@@ -74,15 +85,19 @@ fn follow(client: &Client, run_id: &str, mut show: impl FnMut(&Progress)) -> any
     }
 }
 
-enum Display {
+/// A progress bar on a terminal, a line now and then elsewhere.
+pub struct Display(Kind);
+
+enum Kind {
     Bar(ProgressBar),
     Lines { last_percent: u64, last_phrase: String },
 }
 
 impl Display {
-    fn new() -> Self {
+    /// At nothing.
+    pub fn new() -> Self {
         if !std::io::stderr().is_terminal() {
-            return Self::Lines { last_percent: u64::MAX, last_phrase: String::new() };
+            return Self(Kind::Lines { last_percent: u64::MAX, last_phrase: String::new() });
         }
         let bar = ProgressBar::new(1000);
         if let Ok(style) = ProgressStyle::with_template("  {bar:32} {percent:>3} %  {elapsed:>4}  {wide_msg}")
@@ -90,29 +105,30 @@ impl Display {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(250));
-        Self::Bar(bar)
+        Self(Kind::Bar(bar))
     }
 
-    fn show(&mut self, progress: &Progress) {
-        let phrase = if progress.phrase.is_empty() { &progress.state } else { &progress.phrase };
-        match self {
-            Self::Bar(bar) => {
-                bar.set_position((progress.progress * 1000.0) as u64);
-                bar.set_message(phrase.clone());
+    /// How much is done, 0 to 1, and what is being done.
+    pub fn show(&mut self, done: f64, phrase: &str) {
+        match &mut self.0 {
+            Kind::Bar(bar) => {
+                bar.set_position((done * 1000.0) as u64);
+                bar.set_message(phrase.to_owned());
             }
-            Self::Lines { last_percent, last_phrase } => {
-                let percent = (progress.progress * 100.0) as u64;
+            Kind::Lines { last_percent, last_phrase } => {
+                let percent = (done * 100.0) as u64;
                 if percent / 20 != *last_percent / 20 || (phrase != last_phrase && percent != *last_percent) {
                     eprintln!("  {percent:>3} %  {phrase}");
                     *last_percent = percent;
-                    last_phrase.clone_from(phrase);
+                    phrase.clone_into(last_phrase);
                 }
             }
         }
     }
 
-    fn close(self) {
-        if let Self::Bar(bar) = self {
+    /// Takes the bar away.
+    pub fn close(self) {
+        if let Kind::Bar(bar) = self.0 {
             bar.finish_and_clear();
         }
     }

@@ -123,9 +123,15 @@ fn the_first_session_goes_by_the_commands_of_the_help() -> Result<()> {
     let said = marey(here, &["run", "take 3", "--database", "walks", "--watch"])?;
     let run = said.lines().find_map(|line| line.strip_prefix("run ")).context("no run")?.to_owned();
     assert!(marey(here, &["status"])?.contains(&run));
-    assert!(marey(here, &["status", &run])?.contains("succeeded"));
+    assert!(marey(here, &["status", &run])?.contains("state    succeeded\n"));
     marey(here, &["results", &run, "-o", "take3"])?;
     assert!(fs::read_to_string(here.join("take3/motion.bvh"))?.starts_with("HIERARCHY"));
+    // a session's name stands for its newest run
+    assert_eq!(marey(here, &["status", "take 3"])?, marey(here, &["status", &run])?);
+    marey(here, &["results", "take 3", "-o", "by-name"])?;
+    assert_eq!(fs::read(here.join("by-name/motion.bvh"))?, fs::read(here.join("take3/motion.bvh"))?);
+    leaves_no_session_behind(here)?;
+    follows_what_is_piped_in(here)?;
     let untold = marey(here, &["evaluate", "run", &run]).unwrap_err().to_string();
     assert!(untold.contains("marey upload") && untold.contains("--truth"), "{untold}");
     fs::write(here.join("truth.amc"), trials::motion(41, 360))?;
@@ -150,6 +156,35 @@ fn the_first_session_goes_by_the_commands_of_the_help() -> Result<()> {
     assert!(marey(here, &["status"])?.contains(&run));
     up.stop()?;
     assert_eq!(processes(&here.display().to_string()), Vec::<String>::new());
+    Ok(())
+}
+
+/// An upload that fails at once, and what is asked of the session that it does not make.
+fn leaves_no_session_behind(here: &Path) -> Result<()> {
+    fs::write(here.join("notes.txt"), "a stand-in for the performer")?;
+    for (file, expected) in [("missing.csv", "missing.csv"), ("notes.txt", "--role")] {
+        let refused = marey(here, &["upload", "take 9", file]).unwrap_err().to_string();
+        assert!(refused.contains(expected), "{refused}");
+        let none = marey(here, &["run", "take 9", "--database", "walks"]).unwrap_err().to_string();
+        assert!(none.contains("there is no session \"take 9\""), "{none}");
+    }
+    let none = marey(here, &["results", "take 9"]).unwrap_err().to_string();
+    assert!(none.contains("no run and no session \"take 9\""), "{none}");
+    Ok(())
+}
+
+/// 360 lines of 120 a second, all there at once: every second one is a frame, and none is dropped.
+fn follows_what_is_piped_in(here: &Path) -> Result<()> {
+    let begin = Instant::now();
+    let output = Command::new(MAREY)
+        .args(["live", "-", "--database", "walks", "--skeleton", "skeleton.asf", "-o", "poses.csv"])
+        .current_dir(here)
+        .stdin(fs::File::open(here.join("points.csv"))?)
+        .output()?;
+    let said = String::from_utf8(output.stderr)?;
+    assert!(output.status.success() && said.contains("180 frames, 180 poses, 0 dropped"), "{said}");
+    assert_eq!(fs::read_to_string(here.join("poses.csv"))?.lines().count(), 1 + 180);
+    assert!(begin.elapsed() > Duration::from_millis(2500), "it takes as long as the motion");
     Ok(())
 }
 
@@ -279,6 +314,18 @@ fn cmu_subjects_are_downloaded_continued_and_not_downloaded_again() -> Result<()
     marey(folder.path(), &args)?;
     let again = server.requests()[requests.len()..].to_vec();
     assert!(again.iter().all(|r| !r.contains("16_15") && !r.contains(".asf")), "{again:?}");
+    Ok(())
+}
+
+#[test]
+fn a_download_that_gets_nothing_leaves_nothing() -> Result<()> {
+    let nobody = TcpListener::bind("127.0.0.1:0")?.local_addr()?;
+    let folder = open_folder()?;
+    let url = format!("http://{nobody}");
+    let args = ["data", "cmu", "--subjects", "16", "--base-url", &url, "recordings"];
+    let message = marey(folder.path(), &args).unwrap_err().to_string();
+    assert!(message.contains("16.asf"), "{message}");
+    assert_eq!(fs::read_dir(folder.path().join("recordings"))?.count(), 0);
     Ok(())
 }
 

@@ -11,48 +11,51 @@ use sample_motion::Action;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::{remove, step};
+use super::folder::remove;
 use crate::{results, sample_capture::SampleCapture, session_files, upload, watch};
 
 /// Folder of the results.
 pub const FOLDER: &str = "walk-6-cameras";
-const CAPTURE: SampleCapture = SampleCapture { cameras: 6, frames: 24, action: Action::Walk, seed: 3 };
+/// What is drawn.
+pub const CAPTURE: SampleCapture = SampleCapture { cameras: 6, frames: 24, action: Action::Walk, seed: 3 };
 
-/// Draws a capture, has it tracked, and says how far the joints are from the true ones.
-pub fn show(client: &Client, folder: &Path, output: &Path) -> anyhow::Result<()> {
-    step("Drawing a walk before six cameras: silhouettes, nothing else");
+/// How far the person that was followed is from the true one.
+#[derive(Debug, Clone, Copy)]
+pub struct Followed {
+    /// frames compared
+    pub num_frames: usize,
+    /// mean distance of the joints from the true ones, metres
+    pub mean_m: f64,
+    /// the largest, metres
+    pub largest_m: f64,
+    /// the mean for a baseline: the pose of the first frame, moved along with the pelvis, metres
+    pub carried_m: f64,
+    /// stature of the body that was found, metres
+    pub stature_m: f64,
+}
+
+/// Draws a capture, has it tracked, and compares the joints with the true ones.
+pub fn show(client: &Client, folder: &Path, output: &Path) -> anyhow::Result<Followed> {
+    println!("Drawing a walk before {} cameras: silhouettes, nothing else", CAPTURE.cameras);
     let capture = folder.join("sample-capture");
     remove(&capture)?;
     CAPTURE.write(&capture, || ())?;
-    let name = "walk seen by 6 cameras";
-    step(&format!("Session {name:?}: finding the body, then its motion"));
-    let session = client.create_session(name)?;
+    println!("Finding the person's body in them, then its motion: one session, one run");
+    let session = client.create_session(&format!("walk seen by {} cameras", CAPTURE.cameras))?;
     for found in session_files::gather(&[capture.join("calibration.json"), capture.join("silhouettes")])? {
-        upload::put(client, &session, &found.name, found.role, found.file)?;
+        upload::send(client, &session, &found.name, found.role, found.file)?;
     }
-    let run: Run = client.post(&format!("/v1/sessions/{}/runs", session.id), &json!({}))?;
+    // 30 pictures a second are drawn; silhouettes do not say so
+    let request = json!({ "parameters": { "frame_rate": 30 } });
+    let run: Run = client.post(&format!("/v1/sessions/{}/runs", session.id), &request)?;
     watch::until_end(client, &run.id)?;
     let to = output.join(FOLDER);
     results::download(client, &run.id, &to)?;
 
     let found = points_csv::read(&read(&to.join("joints.csv"))?)?.value;
-    let errors = Errors::new(&found, &truth(&capture.join("groundtruth/joints.json"))?)?;
     let shape: Value = serde_json::from_slice(&read(&to.join("shape.json"))?)?;
-    println!(
-        "\n{} frames, joints off by {:.1} cm on average, {:.1} cm at most; if the first pose were kept and only carried along: \
-         {:.1} cm.",
-        found.num_frames(),
-        100.0 * errors.mean_m,
-        100.0 * errors.largest_m,
-        100.0 * errors.carried_m
-    );
-    println!(
-        "The body: {:.2} m tall, true {:.2} m. The man is synthetic, and one that the body model knows; real people are harder.",
-        shape["measurements"]["stature_m"].as_f64().unwrap_or(f64::NAN),
-        CAPTURE.stature_m(),
-    );
-    println!("Look at overlay_cam0.mp4, and in Blender at body.glb, in {}.", to.display());
-    Ok(())
+    let stature_m = shape["measurements"]["stature_m"].as_f64().context("shape.json has no stature")?;
+    compare(&found, &truth(&capture.join("groundtruth/joints.json"))?, stature_m)
 }
 
 #[derive(Deserialize)]
@@ -75,33 +78,23 @@ fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     fs::read(path).with_context(|| path.display().to_string())
 }
 
-/// Distances of found joints from true ones, metres.
-struct Errors {
-    mean_m: f64,
-    largest_m: f64,
-    /// mean for the pose of the first frame, carried along with the pelvis
-    carried_m: f64,
-}
-
-impl Errors {
-    fn new(found: &PointTrajectories, truth: &Truth) -> anyhow::Result<Self> {
-        let (mut sum, mut largest_m, mut carried, mut count) = (0.0, 0.0_f64, 0.0, 0.0);
-        for (frame, of_frame) in truth.frames.iter().enumerate().take(found.num_frames()) {
-            let way = found.position(frame, 0).zip(found.position(0, 0)).map(|(now, first)| now - first);
-            for (name, place) in truth.joint_names.iter().zip(&of_frame.joints) {
-                let index =
-                    found.point_index(name).with_context(|| format!("no joint {name} in joints.csv"))?;
-                let place = Vector3::from(*place);
-                let at = found.position(frame, index).with_context(|| format!("{name} is missing"))?;
-                let off = (at - place).norm();
-                sum += off;
-                largest_m = largest_m.max(off);
-                if let Some((first, way)) = found.position(0, index).zip(way) {
-                    carried += (first + way - place).norm();
-                }
-                count += 1.0;
+fn compare(found: &PointTrajectories, truth: &Truth, stature_m: f64) -> anyhow::Result<Followed> {
+    let (mut sum, mut largest_m, mut carried, mut count) = (0.0, 0.0_f64, 0.0, 0.0);
+    let num_frames = found.num_frames().min(truth.frames.len());
+    for (frame, true_frame) in truth.frames.iter().enumerate().take(num_frames) {
+        let way = found.position(frame, 0).zip(found.position(0, 0)).map(|(now, first)| now - first);
+        for (name, place) in truth.joint_names.iter().zip(&true_frame.joints) {
+            let index = found.point_index(name).with_context(|| format!("no joint {name} in joints.csv"))?;
+            let place = Vector3::from(*place);
+            let at = found.position(frame, index).with_context(|| format!("{name} is missing"))?;
+            let off = (at - place).norm();
+            sum += off;
+            largest_m = largest_m.max(off);
+            if let Some((first, way)) = found.position(0, index).zip(way) {
+                carried += (first + way - place).norm();
             }
+            count += 1.0;
         }
-        Ok(Self { mean_m: sum / count, largest_m, carried_m: carried / count })
     }
+    Ok(Followed { num_frames, mean_m: sum / count, largest_m, carried_m: carried / count, stature_m })
 }

@@ -1,0 +1,99 @@
+//! Which takes are reconstructed, and which are learned from.
+
+use anyhow::bail;
+
+use crate::take::Take;
+
+/// Takes that are held out, at most: their mean has a standard error of a fifth of their spread.
+const MOST: usize = 24;
+/// Of so many takes of a performer one is held out, at most.
+const SHARE: usize = 5;
+
+/// Takes divided into two.
+#[derive(Debug)]
+pub struct HeldOut {
+    /// to be reconstructed
+    pub tested: Vec<Take>,
+    /// to learn from
+    pub learned: Vec<Take>,
+}
+
+impl HeldOut {
+    /// Divides takes, which are in order of their names: out of each five takes of a performer one is held out, evenly until
+    /// there are enough. The same every time, whatever their motion. All performers stay among those learned from.
+    ///
+    /// # Errors
+    /// If there are fewer than three.
+    pub fn choose(takes: Vec<Take>) -> anyhow::Result<Self> {
+        if takes.len() < 3 {
+            bail!("found {} recorded trials (ASF with AMC, or BVH), expected at least 3", takes.len());
+        }
+        let mut candidates = Vec::new();
+        let mut before = 0;
+        for own in takes.chunk_by(|a, b| a.performer() == b.performer()) {
+            // the middle ones of each five; of few takes one
+            let first = if own.len() < SHARE { own.len() / 2 } else { SHARE / 2 };
+            if own.len() > 2 {
+                candidates.extend((first..own.len()).step_by(SHARE).map(|index| before + index));
+            }
+            before += own.len();
+        }
+        if candidates.is_empty() {
+            candidates.push(takes.len() / 2);
+        }
+        let count = candidates.len().min(MOST);
+        let chosen: Vec<usize> = (0..count).map(|i| candidates[i * candidates.len() / count]).collect();
+        let (mut tested, mut learned) = (Vec::new(), Vec::new());
+        for (index, take) in takes.into_iter().enumerate() {
+            if chosen.contains(&index) { tested.push(take) } else { learned.push(take) }
+        }
+        Ok(Self { tested, learned })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    fn takes(counts: &[usize]) -> Vec<Take> {
+        let name = |(performer, count): (usize, &usize)| {
+            (0..*count).map(move |number| format!("{}_{number:03}", performer + 1)).collect::<Vec<_>>()
+        };
+        let take = |name: String| Take {
+            motion: format!("{name}.amc").into(),
+            name,
+            skeleton: None,
+            indices: Vec::new(),
+        };
+        counts.iter().enumerate().flat_map(name).map(take).collect()
+    }
+
+    #[test]
+    fn every_performer_is_tested_and_learned_from_and_no_trial_is_both() -> anyhow::Result<()> {
+        for counts in [&[36, 36, 36, 36][..], &[3, 4, 5], &[200, 1, 1, 12]] {
+            let HeldOut { tested, learned } = HeldOut::choose(takes(counts))?;
+            assert!(tested.len() <= MOST && !tested.is_empty());
+            assert_eq!(tested.len() + learned.len(), counts.iter().sum::<usize>());
+            assert!(tested.iter().all(|take| learned.iter().all(|other| other.motion != take.motion)));
+            let mut numbers = BTreeMap::<&str, usize>::new();
+            for take in &tested {
+                *numbers.entry(take.performer()).or_default() += 1;
+            }
+            for (performer, count) in counts.iter().enumerate().filter(|(_, count)| **count > 2) {
+                let tested = numbers.get(format!("{}", performer + 1).as_str()).copied().unwrap_or(0);
+                assert!(tested >= 1 && tested <= count.div_ceil(SHARE), "{counts:?}: {numbers:?}");
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn few_trials_of_many_performers_still_leave_one_to_test() -> anyhow::Result<()> {
+        let HeldOut { tested, learned } = HeldOut::choose(takes(&[1, 1, 1]))?;
+        assert_eq!((tested.len(), learned.len()), (1, 2));
+        assert!(HeldOut::choose(takes(&[2])).is_err());
+        Ok(())
+    }
+}
