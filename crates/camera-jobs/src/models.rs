@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use body::{BodyModel, shipped};
+use jobs::{BodyModelFile, SHIPPED};
 use library::Cache;
-use payloads::{BodyModelFile, SHIPPED};
 use proto::{CallError, ErrorCode};
 use queue::JobError;
 use service::{Resources, compute, objects};

@@ -1,8 +1,8 @@
 use std::ops::Range;
 
+use jobs::{CameraReport, Object, report_name};
 use model::{Camera, PointMatch, Silhouette};
 use multi_view::{CameraRecord, MatchClip, SilhouetteClip};
-use payloads::{CameraReport, Object, report_name};
 use queue::{Artefact, JobError};
 use serde::{Deserialize, Serialize};
 use service::{
@@ -45,13 +45,13 @@ impl CameraClips {
     /// # Errors
     /// To be tried again if one is missing.
     pub fn new(report: &CameraReport, artefacts: &[Artefact]) -> Result<Self, JobError> {
-        let stored = |place: &payloads::ClipPlace| {
+        let stored = |place: &jobs::ClipPlace| {
             let artefact = named(artefacts, &place.name)
                 .ok_or_else(|| JobError::retry(format!("{} is missing", place.name)))?;
             let object = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
             Ok(StoredClip { first_frame: place.first_frame, num_frames: place.num_frames, object })
         };
-        let all = |places: &[payloads::ClipPlace]| {
+        let all = |places: &[jobs::ClipPlace]| {
             places.iter().map(stored).collect::<Result<Vec<StoredClip>, JobError>>()
         };
         let (clips, matches) = (all(&report.clips)?, all(&report.matches)?);

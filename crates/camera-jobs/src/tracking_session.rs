@@ -1,4 +1,4 @@
-use payloads::{CameraReport, JobReport, Object, PlanMultiView};
+use jobs::{CameraReport, JobReport, Object, PlanMultiView};
 use queue::JobError;
 use serde::{Deserialize, Serialize};
 use service::{

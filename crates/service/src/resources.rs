@@ -1,7 +1,7 @@
 use std::time::Instant;
 
 use bytes::Bytes;
-use payloads::{InputFile, JobReport};
+use jobs::{InputFile, JobReport};
 use queue::{Artefact, JobContext, JobError};
 use sqlx::PgPool;
 use store::Store;

@@ -1,8 +1,8 @@
-//! What the gateway puts into the queue for reconstructions; for motion databases it is in [`payloads`].
+//! What the gateway puts into the queue for reconstructions; for motion databases it is in [`jobs`](::jobs).
 
 use std::collections::BTreeMap;
 
-use payloads::{InputFile, MotionDatabaseFile};
+use jobs::{InputFile, MotionDatabaseFile};
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 

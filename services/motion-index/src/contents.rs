@@ -1,7 +1,7 @@
 //! What is in a motion database: what people are told of it.
 
 use crate::payload::PartClip;
-use payloads::Augment;
+use jobs::Augment;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

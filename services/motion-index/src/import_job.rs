@@ -7,8 +7,8 @@ use crate::{
     plan_job::no_database,
 };
 use bytes::Bytes;
+use jobs::Object;
 use motion_db::{Augment, MotionDatabase};
-use payloads::Object;
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use store::Store;

@@ -1,6 +1,6 @@
 //! What the jobs of one build give each other.
 
-use payloads::{Augment, MotionDatabaseFile, MotionDatabaseName, Object};
+use jobs::{Augment, MotionDatabaseFile, MotionDatabaseName, Object};
 use serde::{Deserialize, Serialize};
 
 /// Payload of [`crate::IMPORT_MOTION`], made by the plan.

@@ -6,9 +6,9 @@ use crate::{
     payload::{BuildMotionDatabase, ImportMotion},
 };
 use formats::archive::Entry;
+use jobs::{MotionDatabaseFile, Object, PLAN_MOTION_DATABASE, PlanMotionDatabase};
 use library::{motion_database, motion_database::Index};
 use motion_db::MotionDatabase;
-use payloads::{MotionDatabaseFile, Object, PLAN_MOTION_DATABASE, PlanMotionDatabase};
 use queue::{Artefact, ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{compute, config::MemoryConfig, objects};
 use std::sync::Arc;

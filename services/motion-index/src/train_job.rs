@@ -1,8 +1,8 @@
 //! The job that trains a latent variable model of poses on a motion database.
 
 use crate::plan_job::full_name;
+use jobs::{TRAIN_GPLVM, TrainGplvm};
 use library::motion_database;
-use payloads::{TRAIN_GPLVM, TrainGplvm};
 use queue::{Handler, JobContext, JobError, Outcome};
 use regression::gplvm::TrainingOptions;
 use service::{compute, config::MemoryConfig, objects};

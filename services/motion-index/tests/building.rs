@@ -3,8 +3,8 @@
 mod fixture;
 
 use fixture::{Fixture, plan};
+use jobs::{Augment, MotionDatabaseFile, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm};
 use motion_db::{MotionDatabase, trial_of};
-use payloads::{Augment, MotionDatabaseFile, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm};
 use queue::RunState;
 use serde_json::{Value, json};
 use testkit::walker;

@@ -3,9 +3,9 @@
 use crate::performer::FittedReport;
 use crate::{control::Markers, error::InputError};
 use formats::{BvhOptions, PointsOptions};
+pub(crate) use jobs::JobReport;
+pub use jobs::{InputFile, MotionDatabaseFile, Object};
 use model::Axis;
-pub(crate) use payloads::JobReport;
-pub use payloads::{InputFile, MotionDatabaseFile, Object};
 use serde::{Deserialize, Serialize};
 use sparse::Parameters;
 use std::collections::BTreeMap;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use payloads::file_part;
+use jobs::file_part;
 use tracking::Stage;
 
 use crate::results::Finished;

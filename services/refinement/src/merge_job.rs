@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Instant};
 
 use camera_jobs::{MERGE_TRACKS, MergeTracks, TRACKED, TrackingSession, named};
-use payloads::{JobReport, MultiViewReport, TrackingParts};
+use jobs::{JobReport, MultiViewReport, TrackingParts};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use tracking::{Chunk, Stage, hold_unseen, merge};

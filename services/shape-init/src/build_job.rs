@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use body::{LearnOptions, Learned, ScanOptions, ScanSet};
 use formats::archive::{self, Entry, Limits};
-use payloads::{BUILD_BODY_MODEL, BodyModelName, BuildBodyModel, InputFile};
+use jobs::{BUILD_BODY_MODEL, BodyModelName, BuildBodyModel, InputFile};
 use queue::{Handler, JobContext, JobError, Outcome};
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -3,7 +3,7 @@
 use camera_jobs::{
     DRAW_OVERLAY, DrawOverlay, MERGE_TRACKS, MergeTracks, TRACK_CHUNK, TrackChunk, TrackingSession,
 };
-use payloads::Object;
+use jobs::Object;
 use queue::{ChildJob, JobError};
 use tracking::plan_chunks;
 

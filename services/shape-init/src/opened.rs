@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use formats::archive::Entry;
-use payloads::{Source, SourceKind};
+use jobs::{Source, SourceKind};
 use queue::JobError;
 use service::{Resources, compute};
 

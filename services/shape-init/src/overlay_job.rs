@@ -7,8 +7,8 @@ use std::{
 
 use body::{BodyModel, Posed};
 use camera_jobs::{DRAW_OVERLAY, DrawOverlay, Silhouettes, TRACKED, TrackingSession, named};
+use jobs::{SourceKind, file_part};
 use model::{Camera, Image};
-use payloads::{SourceKind, file_part};
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::{
     compute::{self, StopOnDrop},

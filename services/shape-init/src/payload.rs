@@ -1,7 +1,7 @@
 //! What the jobs of one run give each other within this service. Everything that decides the result is in here.
 
+use jobs::{JobReport, PlanMultiView, Source};
 use multi_view::CameraRecord;
-use payloads::{JobReport, PlanMultiView, Source};
 use serde::{Deserialize, Serialize};
 
 /// Payload of [`crate::MAKE_SILHOUETTES`], made by the plan.

@@ -4,12 +4,12 @@ use std::{sync::Arc, time::Instant};
 
 use bytes::Bytes;
 use formats::{calibration, image_files};
-use model::Camera;
-use multi_view::CameraRecord;
-use payloads::{
+use jobs::{
     CamerasPlanned, InputFile, JobReport, PLAN_MULTI_VIEW, PlanMultiView, SOLVE_INVERSE_KINEMATICS,
     SolveInverseKinematics, Source, SourceKind,
 };
+use model::Camera;
+use multi_view::CameraRecord;
 use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{FileError, compute};
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use futures::TryStreamExt;
-use payloads::InputFile;
+use jobs::InputFile;
 use queue::JobError;
 use store::Store;
 use tokio::io::AsyncWriteExt;

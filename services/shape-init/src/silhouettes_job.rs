@@ -9,11 +9,9 @@ use std::{
 };
 
 use formats::{calibration::fit_to_image, image_files};
+use jobs::{CameraReport, ClipPlace, Source, clip_name, file_part, matches_name, picture_name, report_name};
 use model::Image;
 use multi_view::CameraRecord;
-use payloads::{
-    CameraReport, ClipPlace, Source, clip_name, file_part, matches_name, picture_name, report_name,
-};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{FileError, compute, objects};
 use tempfile::TempDir;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use bytes::Bytes;
+use jobs::{InputFile, Members, Source, SourceKind};
 use multi_view::{assign, find_camera};
-use payloads::{InputFile, Members, Source, SourceKind};
 use service::FileError;
 
 use crate::{

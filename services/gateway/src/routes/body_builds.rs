@@ -1,7 +1,7 @@
 //! Building body models.
 
 use axum::extract::State;
-use payloads::{BUILD_BODY_MODEL, BodyModelName, BuildBodyModel};
+use jobs::{BUILD_BODY_MODEL, BodyModelName, BuildBodyModel};
 use queue::{NewRun, ProjectId};
 use serde::Deserialize;
 use utoipa::ToSchema;

@@ -1,7 +1,7 @@
 //! Building motion databases, and training models on them.
 
 use axum::extract::State;
-use payloads::{MotionDatabaseName, PLAN_MOTION_DATABASE, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm};
+use jobs::{MotionDatabaseName, PLAN_MOTION_DATABASE, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm};
 use queue::{NewRun, ProjectId};
 use regression::gplvm::TrainingOptions;
 use serde::Deserialize;
@@ -48,7 +48,7 @@ impl NewBuild {
     fn check(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::Unprocessable(what));
         if let Some(augment) = &self.augment {
-            payloads::Augment::from(augment.clone())
+            jobs::Augment::from(augment.clone())
                 .check()
                 .map_err(|error| Error::Unprocessable(error.to_string()))?;
         }

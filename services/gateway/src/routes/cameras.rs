@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use multi_view::Parameters;
-use payloads::{
+use jobs::{
     InputFile, InverseKinematics, PLAN_MULTI_VIEW, PlanMultiView, SHIPPED, SOLVE_INVERSE_KINEMATICS,
     SolveInverseKinematics,
 };
+use multi_view::Parameters;
 use queue::{NewRun, ProjectId};
 use serde_json::{Map, Value};
 use sqlx::PgConnection;

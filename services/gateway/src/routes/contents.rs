@@ -74,14 +74,14 @@ pub(crate) struct Augment {
     warps: Vec<f64>,
 }
 
-impl From<Augment> for payloads::Augment {
+impl From<Augment> for jobs::Augment {
     fn from(Augment { mirror, warps }: Augment) -> Self {
         Self { mirror, warps }
     }
 }
 
-impl From<payloads::Augment> for Augment {
-    fn from(payloads::Augment { mirror, warps }: payloads::Augment) -> Self {
+impl From<jobs::Augment> for Augment {
+    fn from(jobs::Augment { mirror, warps }: jobs::Augment) -> Self {
         Self { mirror, warps }
     }
 }
@@ -171,7 +171,7 @@ pub(super) async fn details(
 ///
 /// # Errors
 /// 409, if none was trained.
-pub(super) async fn gplvm(db: &mut PgConnection, database: &MotionDatabase) -> Result<payloads::Object> {
+pub(super) async fn gplvm(db: &mut PgConnection, database: &MotionDatabase) -> Result<jobs::Object> {
     let found: Option<(String, String)> = sqlx::query_as(
         "SELECT store_key, blake3 FROM motion_database_models WHERE motion_database_id = $1 AND method = 'gplvm'",
     )
@@ -185,7 +185,7 @@ pub(super) async fn gplvm(db: &mut PgConnection, database: &MotionDatabase) -> R
             database.name, database.version
         ))
     })?;
-    Ok(payloads::Object { store_key, blake3 })
+    Ok(jobs::Object { store_key, blake3 })
 }
 
 /// The augmentation of a database that is ready.

@@ -1,6 +1,6 @@
 //! Starting runs by inverse kinematics.
 
-use payloads::{BodyDescription, IkSolver, InputFile, InverseKinematics};
+use jobs::{BodyDescription, IkSolver, InputFile, InverseKinematics};
 use serde::Deserialize;
 use utoipa::ToSchema;
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use axum::extract::State;
-use payloads::{InputFile, InverseKinematics};
+use jobs::{InputFile, InverseKinematics};
 use queue::{NewJob, NewRun, ProjectId};
 use serde::Deserialize;
 use serde_json::{Map, Value};

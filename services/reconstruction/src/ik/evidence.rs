@@ -1,10 +1,10 @@
 //! What was measured of a session, brought to the frames that are solved.
 
 use formats::PointsOptions;
+use jobs::InverseKinematics;
 use kinematics::{ControlPoint, control_points};
 use model::{Axis, PointTrajectories, Skeleton};
 use nalgebra::Vector3;
-use payloads::InverseKinematics;
 
 use super::MAX_POINTS;
 use crate::{

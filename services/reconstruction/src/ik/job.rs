@@ -5,10 +5,10 @@ use std::{sync::Arc, time::Instant};
 use body::{BodyModel, Shape};
 use camera_jobs::{CameraClips, Described, Silhouettes, reports};
 use inverse_kinematics::{Figure, follow::Solved};
+use jobs::{CameraReport, SOLVE_INVERSE_KINEMATICS, SolveInverseKinematics, frame_rate};
 use kinematics::ControlPoint;
 use model::{Axis, Motion};
 use nalgebra::Vector3;
-use payloads::{CameraReport, SOLVE_INVERSE_KINEMATICS, SolveInverseKinematics, frame_rate};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 
@@ -132,7 +132,7 @@ impl IkHandler {
         cameras: &[CameraReport],
     ) -> Result<Problem, JobError> {
         let resources = &self.shared.resources;
-        let is_wanted = |file: &&payloads::InputFile| file.role == "control-points";
+        let is_wanted = |file: &&jobs::InputFile| file.role == "control-points";
         let files: Vec<_> = request.files.iter().filter(is_wanted).cloned().collect();
         let files = plan_job::fetch(&resources.store, &files, resources.memory.max_object_bytes).await?;
         let (request, limit) = (request.clone(), resources.memory.max_session_frames);

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use body::{BodyModel, Shape};
 use inverse_kinematics::follow::Solved;
-use payloads::{CameraReport, Code, FileReport, JobReport, SolveInverseKinematics};
+use jobs::{CameraReport, Code, FileReport, JobReport, SolveInverseKinematics};
 use serde_json::{Value, json};
 use uuid::Uuid;
 
