@@ -21,6 +21,7 @@ pub mod c3d;
 pub mod calibration;
 mod error;
 mod euler;
+mod file_role;
 mod frame_rate;
 pub mod glb;
 pub mod image_files;
@@ -32,12 +33,14 @@ pub mod ply;
 mod points;
 pub mod points_csv;
 mod read;
+pub mod session;
 mod text;
 mod time_grid;
 pub mod trc;
 
 pub use bvh::Options as BvhOptions;
 pub use error::{Error, Place};
+pub use file_role::{FileRole, UnknownFileRole};
 pub use points::PointsOptions;
 pub use read::{Read, Warning};
 

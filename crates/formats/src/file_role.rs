@@ -1,0 +1,200 @@
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::session::{MotionFormat, PointsFormat, SkeletonFormat};
+
+/// What an uploaded file is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FileRole {
+    /// ASF, or a BVH whose hierarchy is used
+    Skeleton,
+    /// trajectories of control points: CSV, TRC or C3D
+    ControlPoints,
+    /// the motion that really was, for measuring the error: AMC or BVH
+    GroundTruth,
+    /// motion to build a database from: archives, ASF and AMC, BVH
+    Motion,
+    /// scans to learn a body model from: archives, OBJ, PLY, NPY, their rig and tables
+    Scans,
+    /// calibrated cameras: TOML, YAML, JSON, XML, Qualisys
+    Calibration,
+    /// what a camera recorded
+    Video,
+    /// the same as an archive of pictures
+    Images,
+    /// an archive of silhouettes
+    Masks,
+    /// a picture of the empty scene, or an archive of such
+    Plate,
+}
+
+const CALIBRATION: [&str; 6] = ["toml", "json", "yml", "yaml", "xml", "qca.txt"];
+const VIDEO: [&str; 6] = ["mp4", "mov", "m4v", "avi", "mkv", "webm"];
+const PICTURE: [&str; 3] = ["png", "jpg", "jpeg"];
+const ARCHIVE: [&str; 4] = ["zip", "tar", "tgz", "tzst"];
+const MOTION: [&str; 3] = ["asf", "amc", "bvh"];
+const SCAN: [&str; 5] = ["obj", "ply", "npy", "json", "csv"];
+
+impl FileRole {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::Skeleton,
+        Self::ControlPoints,
+        Self::GroundTruth,
+        Self::Motion,
+        Self::Scans,
+        Self::Calibration,
+        Self::Video,
+        Self::Images,
+        Self::Masks,
+        Self::Plate,
+    ];
+
+    /// Its word in requests, answers and payloads.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Skeleton => "skeleton",
+            Self::ControlPoints => "control-points",
+            Self::GroundTruth => "ground-truth",
+            Self::Motion => "motion",
+            Self::Scans => "scans",
+            Self::Calibration => "calibration",
+            Self::Video => "video",
+            Self::Images => "images",
+            Self::Masks => "masks",
+            Self::Plate => "plate",
+        }
+    }
+
+    /// The role that a file of a session has by its name.
+    pub fn from_session_file(name: &str) -> Option<Self> {
+        // A BVH has a skeleton too, but most are there for their motion.
+        let by_extension =
+            [Self::ControlPoints, Self::GroundTruth, Self::Skeleton, Self::Calibration, Self::Video];
+        if let Some(role) = by_extension.into_iter().find(|role| role.fits_session_file(name)) {
+            return Some(role);
+        }
+        let extension = extension(name);
+        let lower = name.to_ascii_lowercase();
+        let tells = |words: &[&str]| words.iter().any(|word| lower.contains(word));
+        match extension.as_str() {
+            picture if PICTURE.contains(&picture) => Some(Self::Plate),
+            archive if !ARCHIVE.contains(&archive) => None,
+            _ if tells(&["plate", "background"]) => Some(Self::Plate),
+            _ if tells(&["image", "frame", "photo", "rgb"]) => Some(Self::Images),
+            _ => Some(Self::Masks),
+        }
+    }
+
+    /// Whether a file of that name can have this role in a session.
+    pub fn fits_session_file(self, name: &str) -> bool {
+        let extension = extension(name);
+        let is_one_of = |extensions: &[&str]| extensions.contains(&extension.as_str());
+        match self {
+            Self::Skeleton => SkeletonFormat::from_name(name).is_some(),
+            Self::ControlPoints => PointsFormat::from_name(name).is_some(),
+            Self::GroundTruth => MotionFormat::from_name(name).is_some(),
+            Self::Calibration => is_one_of(&CALIBRATION),
+            Self::Video => is_one_of(&VIDEO),
+            Self::Images | Self::Masks => is_one_of(&ARCHIVE),
+            Self::Plate => is_one_of(&ARCHIVE) || is_one_of(&PICTURE),
+            Self::Motion | Self::Scans => false,
+        }
+    }
+
+    /// Whether motion databases are built from files of that name.
+    pub fn is_motion_file(name: &str) -> bool {
+        let extension = extension(name);
+        MOTION.contains(&extension.as_str()) || ARCHIVE.contains(&extension.as_str())
+    }
+
+    /// Whether body models are learned from files of that name.
+    pub fn is_scan_file(name: &str) -> bool {
+        let extension = extension(name);
+        SCAN.contains(&extension.as_str()) || ARCHIVE.contains(&extension.as_str())
+    }
+}
+
+impl fmt::Display for FileRole {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// A word that is no role.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("found role {found:?}, expected one of {}", FileRole::ALL.map(FileRole::as_str).join(", "))]
+pub struct UnknownFileRole {
+    /// The word.
+    pub found: String,
+}
+
+impl TryFrom<String> for FileRole {
+    type Error = UnknownFileRole;
+
+    fn try_from(found: String) -> Result<Self, UnknownFileRole> {
+        Self::ALL.into_iter().find(|role| role.as_str() == found).ok_or(UnknownFileRole { found })
+    }
+}
+
+/// What a file's name says of its format: its extension in lower case, without `.zst` or `.gz` behind it; empty if there is
+/// none.
+pub(crate) fn extension(name: &str) -> String {
+    let lower = name.to_ascii_lowercase();
+    let inner = lower.strip_suffix(".zst").or(lower.strip_suffix(".gz")).unwrap_or(&lower);
+    let extension = match inner.rsplit_once('.') {
+        _ if inner.ends_with(".qca.txt") => "qca.txt",
+        Some((_, extension)) => extension,
+        None => return String::new(),
+    };
+    let has_stem = inner.len() > extension.len() + 1;
+    if has_stem { extension.to_owned() } else { String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn roles_follow_from_names() {
+        assert_eq!(FileRole::from_session_file("16.ASF"), Some(FileRole::Skeleton));
+        assert_eq!(FileRole::from_session_file("points.csv"), Some(FileRole::ControlPoints));
+        assert_eq!(FileRole::from_session_file("16_15.amc.zst"), Some(FileRole::GroundTruth));
+        assert_eq!(FileRole::from_session_file("walk.bvh"), Some(FileRole::GroundTruth));
+        assert_eq!(FileRole::from_session_file("notes.txt"), None);
+        assert_eq!(FileRole::from_session_file("Calib.qca.txt"), Some(FileRole::Calibration));
+        assert_eq!(FileRole::from_session_file("cam01.MP4"), Some(FileRole::Video));
+        assert_eq!(FileRole::from_session_file("cam01.plate.png"), Some(FileRole::Plate));
+        assert_eq!(FileRole::from_session_file("plates.zip"), Some(FileRole::Plate));
+        assert_eq!(FileRole::from_session_file("images.zip"), Some(FileRole::Images));
+        assert_eq!(FileRole::from_session_file("silhouettes.tar.gz"), Some(FileRole::Masks));
+        assert_eq!(FileRole::from_session_file("scan.obj"), None);
+        assert!(!FileRole::Video.fits_session_file("cam01.zip"));
+        assert!(FileRole::is_scan_file("s001.obj") && !FileRole::is_scan_file("s001.bvh"));
+        assert_eq!(FileRole::from_session_file(".csv"), None);
+        assert!(FileRole::Skeleton.fits_session_file("a.bvh"));
+        assert!(!FileRole::Skeleton.fits_session_file("a.csv"));
+        assert!(FileRole::is_motion_file("all.tar.zst"));
+        assert!(FileRole::is_motion_file("all.tgz"));
+        assert!(!FileRole::is_motion_file("scan.obj"));
+        assert!(!FileRole::is_motion_file("points.csv"));
+    }
+
+    #[test]
+    fn extensions_are_without_compression() {
+        assert_eq!(extension("16_15.AMC.zst"), "amc");
+        assert_eq!(extension("points"), "");
+        assert_eq!(extension(".qca.txt"), "");
+    }
+
+    #[test]
+    fn words_are_the_same_in_json_and_in_messages() {
+        for role in FileRole::ALL {
+            assert_eq!(serde_json::to_value(role).unwrap(), role.to_string());
+            assert_eq!(serde_json::from_value::<FileRole>(role.as_str().into()).unwrap(), role);
+            assert_eq!(FileRole::try_from(role.to_string()), Ok(role));
+        }
+    }
+}
