@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use body::{BodyModel, shipped};
-use jobs::{BodyModelFile, SHIPPED};
+use jobs::body_model::{BodyModelFile, SHIPPED};
 use library::Cache;
 use proto::{CallError, ErrorCode};
 use queue::JobError;

@@ -1,10 +1,12 @@
 use std::ops::Range;
 
-use jobs::{CameraReport, Object, report_name};
+use jobs::{
+    Object,
+    multi_view::{CameraClips, CameraReport, StoredClip, report_name},
+};
 use model::{Camera, PointMatch, Silhouette};
-use multi_view::{CameraRecord, MatchClip, SilhouetteClip};
+use multi_view::{MatchClip, SilhouetteClip};
 use queue::{Artefact, JobError};
-use serde::{Deserialize, Serialize};
 use service::{
     Resources, compute,
     objects::{self, Input},
@@ -16,54 +18,6 @@ const MAX_BYTES: u64 = 256 << 20;
 /// What one camera saw of the person.
 pub type View = (Camera, Silhouette);
 
-/// A clip of silhouettes, or of points that were found again, in the store.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StoredClip {
-    /// first frame in it
-    pub first_frame: usize,
-    /// frames in it
-    pub num_frames: usize,
-    /// where it is
-    pub object: Object,
-}
-
-/// A camera and its clips, in the order of their frames.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CameraClips {
-    /// as it fits the silhouettes
-    pub camera: CameraRecord,
-    /// without gaps
-    pub clips: Vec<StoredClip>,
-    /// points that were found again, of the same frames; none where there are no pictures
-    #[serde(default)]
-    pub matches: Vec<StoredClip>,
-}
-
-impl CameraClips {
-    /// The clips that a camera's job reported, among what it left.
-    ///
-    /// # Errors
-    /// To be tried again if one is missing.
-    pub fn new(report: &CameraReport, artefacts: &[Artefact]) -> Result<Self, JobError> {
-        let stored = |place: &jobs::ClipPlace| {
-            let artefact = named(artefacts, &place.name)
-                .ok_or_else(|| JobError::retry(format!("{} is missing", place.name)))?;
-            let object = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
-            Ok(StoredClip { first_frame: place.first_frame, num_frames: place.num_frames, object })
-        };
-        let all = |places: &[jobs::ClipPlace]| {
-            places.iter().map(stored).collect::<Result<Vec<StoredClip>, JobError>>()
-        };
-        let (clips, matches) = (all(&report.clips)?, all(&report.matches)?);
-        Ok(Self { camera: report.camera.clone(), clips, matches })
-    }
-}
-
-/// The artefact of that name.
-pub fn named<'a>(artefacts: &'a [Artefact], name: &str) -> Option<&'a Artefact> {
-    artefacts.iter().find(|artefact| artefact.name == name)
-}
-
 /// What was found of every camera, in their order.
 ///
 /// # Errors
@@ -71,7 +25,8 @@ pub fn named<'a>(artefacts: &'a [Artefact], name: &str) -> Option<&'a Artefact> 
 pub async fn reports(resources: &Resources, artefacts: &[Artefact]) -> Result<Vec<CameraReport>, JobError> {
     let mut reports = Vec::new();
     for index in 0.. {
-        let Some(artefact) = named(artefacts, &report_name(index)) else { break };
+        let name = report_name(index);
+        let Some(artefact) = artefacts.iter().find(|artefact| artefact.name == name) else { break };
         let bytes = resources.read_artefact(artefact, MAX_BYTES).await?;
         reports.push(serde_json::from_slice(&bytes).map_err(JobError::retry)?);
     }
@@ -82,11 +37,11 @@ pub async fn reports(resources: &Resources, artefacts: &[Artefact]) -> Result<Ve
 /// kilobytes each.
 #[derive(Debug, Clone)]
 pub struct Silhouettes {
-    cameras: Vec<OfCamera>,
+    cameras: Vec<CameraFrames>,
 }
 
 #[derive(Debug, Clone)]
-struct OfCamera {
+struct CameraFrames {
     camera: Camera,
     clips: Vec<SilhouetteClip>,
     matches: Vec<MatchClip>,
@@ -103,11 +58,11 @@ impl Silhouettes {
         frames: Range<usize>,
     ) -> Result<Self, JobError> {
         let mut read = Vec::with_capacity(cameras.len());
-        for of in cameras {
-            let camera = of.camera.camera().map_err(JobError::retry)?;
-            let clips = clips(resources, &of.clips, &frames, SilhouetteClip::from_bytes).await?;
-            let matches = self::clips(resources, &of.matches, &frames, MatchClip::from_bytes).await?;
-            read.push(OfCamera { camera, clips, matches });
+        for stored in cameras {
+            let camera = stored.camera.camera().map_err(JobError::retry)?;
+            let clips = clips(resources, &stored.clips, &frames, SilhouetteClip::from_bytes).await?;
+            let matches = self::clips(resources, &stored.matches, &frames, MatchClip::from_bytes).await?;
+            read.push(CameraFrames { camera, clips, matches });
         }
         Ok(Self { cameras: read })
     }
@@ -117,7 +72,7 @@ impl Silhouettes {
     /// # Errors
     /// If a camera has no silhouette of it, or a damaged one.
     pub fn views(&self, frame: usize) -> multi_view::Result<Vec<View>> {
-        let of_camera = |OfCamera { camera, clips, .. }: &OfCamera| {
+        let view = |CameraFrames { camera, clips, .. }: &CameraFrames| {
             let clip = clips.iter().find(|clip| clip.frames().contains(&frame));
             let missing = || {
                 let start = clips.first().map_or(0, |clip| clip.frames().start);
@@ -126,7 +81,7 @@ impl Silhouettes {
             };
             Ok((camera.clone(), clip.ok_or_else(missing)?.get(frame)?))
         };
-        self.cameras.iter().map(of_camera).collect()
+        self.cameras.iter().map(view).collect()
     }
 
     /// The points of every camera that were found again in a frame; none where they were not looked for.
@@ -134,11 +89,11 @@ impl Silhouettes {
     /// # Errors
     /// If they are damaged.
     pub fn matches(&self, frame: usize) -> multi_view::Result<Vec<Vec<PointMatch>>> {
-        let of_camera = |of: &OfCamera| {
-            let clip = of.matches.iter().find(|clip| clip.frames().contains(&frame));
+        let matches = |camera: &CameraFrames| {
+            let clip = camera.matches.iter().find(|clip| clip.frames().contains(&frame));
             clip.map_or(Ok(Vec::new()), |clip| clip.get(frame))
         };
-        self.cameras.iter().map(of_camera).collect()
+        self.cameras.iter().map(matches).collect()
     }
 }
 

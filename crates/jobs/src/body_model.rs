@@ -1,15 +1,18 @@
+//! Runs that learn body models from scans.
+
+use queue::Job;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use crate::InputFile;
 
-/// Kind of the job [`BuildBodyModel`], taken by the shape-init service.
-pub const BUILD_BODY_MODEL: &str = "build-body-model";
+/// The kind of such runs.
+pub const RUN_KIND: &str = "body-model";
 
 /// Name of the body model that comes with the program; it has no row and no object.
 pub const SHIPPED: &str = "shipped";
 
-/// Learns a body model from uploaded scans.
+/// Learns a body model from uploaded scans. Taken by the shape-init service.
 ///
 /// Its completing transaction sets `store_key`, `bytes`, `blake3`, `num_vertices`, `num_components`, `contents` and
 /// `ready_at` of its row in `body_models`: from then on the model is ready.
@@ -24,6 +27,10 @@ pub struct BuildBodyModel {
     /// Metres of one unit of the scans; `None` to find out.
     #[serde(default)]
     pub metres_per_unit: Option<f64>,
+}
+
+impl Job for BuildBodyModel {
+    const KIND: &'static str = "build-body-model";
 }
 
 /// A body model by id, name and version.

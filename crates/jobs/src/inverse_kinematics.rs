@@ -1,12 +1,16 @@
+//! Runs by inverse kinematics: one job solves measured points, and silhouettes of cameras where there are any.
+
 use std::collections::BTreeMap;
 
+use model::Axis;
+use queue::Job;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use crate::{BodyModelFile, CameraReport, InputFile, JobReport};
+use crate::{InputFile, JobReport, body_model::BodyModelFile, multi_view::CameraReport};
 
-/// Kind of the job [`SolveInverseKinematics`], taken by the reconstruction service.
-pub const SOLVE_INVERSE_KINEMATICS: &str = "solve-inverse-kinematics";
+/// The kind of such runs.
+pub const RUN_KIND: &str = "inverse-kinematics";
 
 /// What is wanted of a pose, the most important first.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,7 +84,8 @@ pub struct InverseKinematics {
     pub marker_prefix: Option<String>,
 }
 
-/// Solves a session's measured points, and silhouettes that jobs before it have made, for the poses of a body.
+/// Solves a session's measured points, and silhouettes that jobs before it have made, for the poses of a body. Taken by the
+/// reconstruction service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SolveInverseKinematics {
     /// The session.
@@ -91,14 +96,18 @@ pub struct SolveInverseKinematics {
     pub body_model: BodyModelFile,
     /// The session's files, in order of name.
     pub files: Vec<InputFile>,
-    /// Axis of the files of points that points up, `x`, `y`, `z`, where they don't say it or say it wrong.
+    /// Axis of the files of points that points up, where they don't say it or say it wrong.
     #[serde(default)]
-    pub up: Option<String>,
+    pub up: Option<Axis>,
     /// All resolved.
     pub how: InverseKinematics,
     /// With cameras, their plan.
     #[serde(default)]
     pub cameras: Option<CamerasPlanned>,
+}
+
+impl Job for SolveInverseKinematics {
+    const KIND: &'static str = "solve-inverse-kinematics";
 }
 
 /// What the plan of the cameras hands on.

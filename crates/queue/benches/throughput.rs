@@ -6,7 +6,10 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use queue::{ChildJob, Handler, JobContext, JobError, NewRun, Outcome, ProjectId, RunId, RunState, Worker};
+use queue::{
+    ChildJob, Handler, Job, JobContext, JobError, NewRun, Outcome, ProjectId, RunId, RunState, Worker,
+};
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 use sqlx::PgPool;
 use testkit::postgres::TestDatabase;
@@ -19,15 +22,29 @@ const THROUGHPUT_JOBS: usize = 10_000;
 const WORKERS: usize = 4;
 const SLOTS: usize = 8;
 
+/// A job that is waited for.
+#[derive(Serialize, Deserialize)]
+struct Latency(usize);
+
+impl Job for Latency {
+    const KIND: &'static str = "latency";
+}
+
+/// One of many jobs.
+#[derive(Serialize, Deserialize)]
+struct Throughput(usize);
+
+impl Job for Throughput {
+    const KIND: &'static str = "throughput";
+}
+
 /// Tells when it was started.
 struct Starts(mpsc::UnboundedSender<Instant>);
 
 impl Handler for Starts {
-    fn kind(&self) -> &'static str {
-        "latency"
-    }
+    type Job = Latency;
 
-    async fn run(&self, _job: JobContext) -> Result<Outcome, JobError> {
+    async fn run(&self, _context: JobContext, _job: Latency) -> Result<Outcome, JobError> {
         self.0.send(Instant::now()).map_err(JobError::retry)?;
         Ok(Outcome::default())
     }
@@ -37,11 +54,9 @@ impl Handler for Starts {
 struct Nothing(Arc<Mutex<usize>>);
 
 impl Handler for Nothing {
-    fn kind(&self) -> &'static str {
-        "throughput"
-    }
+    type Job = Throughput;
 
-    async fn run(&self, _job: JobContext) -> Result<Outcome, JobError> {
+    async fn run(&self, _context: JobContext, _job: Throughput) -> Result<Outcome, JobError> {
         *self.0.lock().map_err(JobError::retry)? += 1;
         Ok(Outcome::default())
     }
@@ -56,13 +71,17 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-async fn enqueue(pool: &PgPool, kind: &str, count: usize) -> Result<RunId, Box<dyn std::error::Error>> {
+async fn enqueue<J: Job>(
+    pool: &PgPool,
+    job: fn(usize) -> J,
+    count: usize,
+) -> Result<RunId, Box<dyn std::error::Error>> {
     let mut transaction = pool.begin().await?;
     let project_id = ProjectId(Uuid::new_v4());
     let run = NewRun { project_id, kind: "bench", session_id: None, parameters: json!({}) };
     let run_id = queue::enqueue_run(&mut transaction, &run).await?;
-    let jobs: Vec<_> = (0..count).map(|index| ChildJob::new(kind, json!(index))).collect();
-    queue::enqueue_many(&mut transaction, run_id, &jobs).await?;
+    let jobs: Result<Vec<_>, _> = (0..count).map(|index| ChildJob::new(&job(index))).collect();
+    queue::enqueue_many(&mut transaction, run_id, &jobs?).await?;
     transaction.commit().await?;
     Ok(run_id)
 }
@@ -76,7 +95,7 @@ async fn latency(pool: &PgPool) -> Result<(), Box<dyn std::error::Error>> {
     // The first few find the worker still connecting.
     for round in 0..LATENCY_JOBS + 20 {
         let enqueued = Instant::now();
-        enqueue(pool, "latency", 1).await?;
+        enqueue(pool, Latency, 1).await?;
         let start = started.recv().await.ok_or("the worker stopped")?;
         if round >= 20 {
             millis.push(start.duration_since(enqueued).as_secs_f64() * 1e3);
@@ -101,7 +120,7 @@ async fn throughput(pool: &PgPool) -> Result<(), Box<dyn std::error::Error>> {
     let began = Instant::now();
     let mut runs = Vec::new();
     for _ in 0..WORKERS {
-        runs.push(enqueue(pool, "throughput", THROUGHPUT_JOBS / WORKERS).await?);
+        runs.push(enqueue(pool, Throughput, THROUGHPUT_JOBS / WORKERS).await?);
     }
     println!("enqueue in batches: {:.0} jobs/s", THROUGHPUT_JOBS as f64 / began.elapsed().as_secs_f64());
     let done = Arc::new(Mutex::new(0));

@@ -68,5 +68,5 @@ SET state = 'running',
     progress = 0
 FROM taken
 WHERE jobs.id = taken.id
-RETURNING jobs.id, jobs.run_id, jobs.project_id, jobs.kind, jobs.payload,
+RETURNING jobs.id, jobs.run_id, jobs.project_id, jobs.kind, jobs.payload, jobs.payload_version,
           jobs.attempts AS attempt, jobs.max_attempts, jobs.lease_number

@@ -26,6 +26,7 @@ pub async fn enqueue(connection: &mut PgConnection, job: &NewJob<'_>) -> Result<
         ids: vec![id],
         kinds: vec![job.kind],
         payloads: vec![&job.payload],
+        payload_versions: vec![job.payload_version],
         priorities: vec![job.priority],
         weights: vec![job.weight],
         max_attempts: vec![job.max_attempts],
@@ -66,8 +67,9 @@ pub async fn enqueue_many(
     let ids = draw_ids(connection, jobs.len()).await?;
     let rows = Rows {
         ids: ids.clone(),
-        kinds: jobs.iter().map(|job| job.kind.as_str()).collect(),
+        kinds: jobs.iter().map(|job| job.kind).collect(),
         payloads: jobs.iter().map(|job| &job.payload).collect(),
+        payload_versions: jobs.iter().map(|job| job.payload_version).collect(),
         priorities: jobs.iter().map(|job| job.priority).collect(),
         weights: jobs.iter().map(|job| job.weight).collect(),
         max_attempts: jobs.iter().map(|job| job.max_attempts).collect(),
@@ -133,6 +135,7 @@ struct Rows<'a> {
     ids: Vec<JobId>,
     kinds: Vec<&'a str>,
     payloads: Vec<&'a Value>,
+    payload_versions: Vec<i32>,
     priorities: Vec<i16>,
     weights: Vec<f64>,
     max_attempts: Vec<i32>,
@@ -152,6 +155,7 @@ impl Rows<'_> {
             .bind(&self.ids)
             .bind(&self.kinds)
             .bind(self.payloads.iter().map(|payload| (*payload).clone()).collect::<Vec<Value>>())
+            .bind(&self.payload_versions)
             .bind(&self.priorities)
             .bind(&self.weights)
             .bind(&self.max_attempts)

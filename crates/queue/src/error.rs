@@ -1,6 +1,6 @@
-//! What the queue refuses.
+//! What the queue refuses, and why attempts at jobs fail.
 
-use crate::{JobError, JobId, RunId, RunState};
+use crate::{JobId, RunId, RunState};
 
 /// What can go wrong in a call to the queue.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +40,14 @@ pub enum Error {
         /// How many there should be.
         expected: usize,
     },
+    /// A payload that is no JSON.
+    #[error("the payload of a {kind} job can't be stored: {source}")]
+    Payload {
+        /// Kind of the job.
+        kind: &'static str,
+        /// Why not.
+        source: serde_json::Error,
+    },
     /// The handler's own SQL in the completing transaction refused.
     #[error("on_complete: {0}")]
     OnComplete(#[source] JobError),
@@ -60,6 +68,58 @@ impl Error {
         match self {
             Self::Database(error) | Self::OnComplete(JobError::Database(error)) => is_transient(error),
             _ => false,
+        }
+    }
+}
+
+/// Why an attempt did not succeed.
+#[derive(Debug, thiserror::Error)]
+pub enum JobError {
+    /// Something outside failed that may work later: the network, the object store, a lock.
+    #[error("{detail}")]
+    Retry {
+        /// For a developer.
+        detail: String,
+    },
+    /// The input is bad: no further attempt will help.
+    #[error("{message}: {detail}")]
+    GiveUp {
+        /// For the user, who can do something about it.
+        message: String,
+        /// For a developer.
+        detail: String,
+    },
+    /// It stopped because [`JobContext::is_cancelled`](crate::JobContext::is_cancelled) said so.
+    #[error("stopped before the end")]
+    Stopped,
+    /// The database failed; the attempt, or in [`Outcome::on_complete`](crate::Outcome::on_complete) the completion, is tried again.
+    #[error("database: {0}")]
+    Database(#[from] sqlx::Error),
+}
+
+impl JobError {
+    /// An attempt that may succeed later.
+    pub fn retry(detail: impl ToString) -> Self {
+        Self::Retry { detail: detail.to_string() }
+    }
+
+    /// Bad input. `message` is for the user, `detail` for a developer.
+    pub fn give_up(message: impl Into<String>, detail: impl ToString) -> Self {
+        Self::GiveUp { message: message.into(), detail: detail.to_string() }
+    }
+
+    /// Bad input of which an error tells everything: its message is for the user, all that it holds for a developer.
+    pub fn bad_input(error: impl std::error::Error) -> Self {
+        Self::give_up(error.to_string(), format!("{error:?}"))
+    }
+}
+
+impl From<Error> for JobError {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Database(error) => Self::Database(error),
+            Error::OnComplete(error) => error,
+            error => Self::retry(error),
         }
     }
 }

@@ -1,12 +1,37 @@
 //! Jobs to be enqueued, jobs that were claimed, and what jobs leave behind.
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::{JobId, LeaseNumber, ProjectId, RunId};
+use crate::{Error, JobId, LeaseNumber, ProjectId, RunId};
 
 /// Attempts that a job gets unless it says otherwise.
 pub const DEFAULT_MAX_ATTEMPTS: i32 = 3;
+
+/// What a job is given: the payload of one kind of job, and how such jobs are enqueued and read.
+///
+/// A payload whose meaning changes gets the next [`VERSION`](Self::VERSION): a job that was enqueued before and is run
+/// after the change is then brought up to date by [`upgrade`](Self::upgrade), or refused, and never misread.
+pub trait Job: Serialize + DeserializeOwned + Send + 'static {
+    /// Which handler runs it.
+    const KIND: &'static str;
+    /// Version of the payload, from 1.
+    const VERSION: i32 = 1;
+    /// After so many failed attempts the job has failed for good; 1 to 1000.
+    const MAX_ATTEMPTS: i32 = DEFAULT_MAX_ATTEMPTS;
+
+    /// The payload of another version as one of [`VERSION`](Self::VERSION); `None` if that can't be said.
+    fn upgrade(version: i32, payload: Value) -> Option<Value> {
+        let _ = (version, payload);
+        None
+    }
+}
+
+/// The payload of a job as it is stored.
+fn payload<J: Job>(job: &J) -> Result<Value, Error> {
+    serde_json::to_value(job).map_err(|source| Error::Payload { kind: J::KIND, source })
+}
 
 /// A job to be added to a run.
 #[derive(Debug, Clone)]
@@ -14,9 +39,11 @@ pub struct NewJob<'a> {
     /// The run that it belongs to.
     pub run_id: RunId,
     /// Which handler runs it.
-    pub kind: &'a str,
+    pub kind: &'static str,
     /// What the handler is given.
     pub payload: Value,
+    /// Version of the payload.
+    pub payload_version: i32,
     /// Higher goes first within a project; 0 is usual.
     pub priority: i16,
     /// After so many failed attempts the job has failed for good; 1 to 1000.
@@ -28,17 +55,21 @@ pub struct NewJob<'a> {
 }
 
 impl<'a> NewJob<'a> {
-    /// A job with the usual priority, attempts and weight that depends on nothing.
-    pub fn new(run_id: RunId, kind: &'a str, payload: Value) -> Self {
-        Self {
+    /// A job with the usual priority and weight that depends on nothing.
+    ///
+    /// # Errors
+    /// [`Error::Payload`].
+    pub fn new<J: Job>(run_id: RunId, job: &J) -> Result<Self, Error> {
+        Ok(Self {
             run_id,
-            kind,
-            payload,
+            kind: J::KIND,
+            payload: payload(job)?,
+            payload_version: J::VERSION,
             priority: 0,
-            max_attempts: DEFAULT_MAX_ATTEMPTS,
+            max_attempts: J::MAX_ATTEMPTS,
             depends_on: &[],
             weight: 1.0,
-        }
+        })
     }
 }
 
@@ -46,9 +77,11 @@ impl<'a> NewJob<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChildJob {
     /// Which handler runs it.
-    pub kind: String,
+    pub kind: &'static str,
     /// What the handler is given.
     pub payload: Value,
+    /// Version of the payload.
+    pub payload_version: i32,
     /// Higher goes first within a project; 0 is usual.
     pub priority: i16,
     /// After so many failed attempts the job has failed for good; 1 to 1000.
@@ -60,16 +93,20 @@ pub struct ChildJob {
 }
 
 impl ChildJob {
-    /// A job with the usual priority, attempts and weight that depends on nothing.
-    pub fn new(kind: impl Into<String>, payload: Value) -> Self {
-        Self {
-            kind: kind.into(),
-            payload,
+    /// A job with the usual priority and weight that depends on nothing.
+    ///
+    /// # Errors
+    /// [`Error::Payload`].
+    pub fn new<J: Job>(job: &J) -> Result<Self, Error> {
+        Ok(Self {
+            kind: J::KIND,
+            payload: payload(job)?,
+            payload_version: J::VERSION,
             priority: 0,
-            max_attempts: DEFAULT_MAX_ATTEMPTS,
+            max_attempts: J::MAX_ATTEMPTS,
             depends_on: Vec::new(),
             weight: 1.0,
-        }
+        })
     }
 
     /// The same job, waiting for these positions of the batch.
@@ -114,6 +151,8 @@ pub struct ClaimedJob {
     pub kind: String,
     /// What the handler is given.
     pub payload: Value,
+    /// Version of the payload.
+    pub payload_version: i32,
     /// Which attempt this is, from 1.
     pub attempt: i32,
     /// How many attempts there are.

@@ -7,19 +7,26 @@
 //!
 //! ```no_run
 //! # async fn example(pool: sqlx::PgPool, project_id: queue::ProjectId) -> Result<(), Box<dyn std::error::Error>> {
-//! use queue::{ChildJob, Handler, JobContext, JobError, NewRun, Outcome, Worker};
+//! use queue::{ChildJob, Handler, Job, JobContext, JobError, NewRun, Outcome, Worker};
+//! use serde::{Deserialize, Serialize};
 //! use tokio_util::sync::CancellationToken;
 //!
-//! struct Greet;
+//! #[derive(Serialize, Deserialize)]
+//! struct Greet {
+//!     name: String,
+//! }
 //!
-//! impl Handler for Greet {
-//!     fn kind(&self) -> &'static str {
-//!         "greet"
-//!     }
+//! impl Job for Greet {
+//!     const KIND: &'static str = "greet";
+//! }
 //!
-//!     async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-//!         let name: String = job.payload()?;
-//!         job.progress(0.5, format!("greeting {name}"));
+//! struct Greeter;
+//!
+//! impl Handler for Greeter {
+//!     type Job = Greet;
+//!
+//!     async fn run(&self, context: JobContext, job: Greet) -> Result<Outcome, JobError> {
+//!         context.progress(0.5, format!("greeting {}", job.name));
 //!         Ok(Outcome::default())
 //!     }
 //! }
@@ -28,16 +35,13 @@
 //! let mut transaction = pool.begin().await?;
 //! let run = NewRun { project_id, kind: "greeting", session_id: None, parameters: serde_json::json!({}) };
 //! let run_id = queue::enqueue_run(&mut transaction, &run).await?;
-//! let jobs = [
-//!     ChildJob::new("greet", "Ada".into()),
-//!     ChildJob::new("greet", "Grace".into()),
-//!     ChildJob::new("greet", "everyone".into()).depends_on([0, 1]),
-//! ];
+//! let greet = |name: &str| ChildJob::new(&Greet { name: name.to_owned() });
+//! let jobs = [greet("Ada")?, greet("Grace")?, greet("everyone")?.depends_on([0, 1])];
 //! queue::enqueue_many(&mut transaction, run_id, &jobs).await?;
 //! transaction.commit().await?;
 //!
 //! let shutdown = CancellationToken::new();
-//! let worker = Worker::builder(pool).handler(Greet).concurrency(2).start(shutdown.clone());
+//! let worker = Worker::builder(pool).handler(Greeter).concurrency(2).start(shutdown.clone());
 //! shutdown.cancel();
 //! worker.stopped().await;
 //! # Ok(())
@@ -63,17 +67,17 @@ mod worker;
 pub use backoff::RetryPolicy;
 pub use claim::{claim, is_any_available};
 pub use enqueue::{enqueue, enqueue_many};
-pub use error::Error;
+pub use error::{Error, JobError};
 pub use finish::{Completion, Failure, Lease, Settled, acknowledge_cancel, complete, fail, hand_back};
 pub use ids::{JobId, LeaseNumber, ProjectId, RunId};
-pub use job::{Artefact, ChildJob, ClaimedJob, DEFAULT_MAX_ATTEMPTS, NewJob};
+pub use job::{Artefact, ChildJob, ClaimedJob, DEFAULT_MAX_ATTEMPTS, Job, NewJob};
 pub use lease::{Beat, BeatAnswer, heartbeat};
 pub use read::{Depth, InputArtefact, dependency_artefacts, depth, run_results};
 pub use reap::{Reaped, reap};
 pub use run::{NewRun, RunStatus, cancel_run, enqueue_run, run_status};
 pub use settings::{heartbeat_interval, set_staleness, staleness};
 pub use state::{JobState, RunState};
-pub use worker::{Handler, JobContext, JobError, OnComplete, Outcome, Worker, WorkerBuilder, WorkerHandle};
+pub use worker::{Handler, JobContext, OnComplete, Outcome, Worker, WorkerBuilder, WorkerHandle};
 
 /// The schema of the whole system, `migrations/` in the repository.
 pub static MIGRATOR: sqlx::migrate::Migrator = sqlx::migrate!("../../migrations");

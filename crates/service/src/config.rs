@@ -95,16 +95,6 @@ impl WorkerConfig {
             format!("{service}@{}/{}", host.trim(), std::process::id())
         })
     }
-
-    /// A worker loop on `pool` that is set up as configured; `None` if it is to claim nothing.
-    pub fn builder(&self, service: &str, pool: &sqlx::PgPool) -> Option<queue::WorkerBuilder> {
-        (self.concurrency > 0).then(|| {
-            queue::Worker::builder(pool.clone())
-                .name(self.name(service))
-                .concurrency(self.concurrency)
-                .grace(self.shutdown_grace)
-        })
-    }
 }
 
 /// Bounds on memory.

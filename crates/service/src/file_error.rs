@@ -1,3 +1,5 @@
+use formats::FileRole;
+
 /// What is wrong with a file or a field, whatever service finds it. The message is for the owner of the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -24,7 +26,7 @@ pub enum FileError {
     #[error("session has {found} files of role {role}{names}, expected {expected}")]
     Count {
         /// The role.
-        role: &'static str,
+        role: FileRole,
         /// How many files.
         found: usize,
         /// Which, in brackets.

@@ -98,7 +98,7 @@ pub async fn write_result_file(
 }
 
 /// Removes what earlier attempts at the job left. Failing to is no reason to fail the job.
-pub async fn clean_up_earlier_attempts(store: &Store, job: &JobContext) {
+pub(crate) async fn clean_up_earlier_attempts(store: &Store, job: &JobContext) {
     clean_up_earlier_attempts_under(store, job, &key::job_prefix(job.run_id().0, job.id().0)).await;
 }
 

@@ -1,6 +1,5 @@
-use std::time::Instant;
-
 use bytes::Bytes;
+use futures::future::BoxFuture;
 use jobs::{InputFile, JobReport};
 use queue::{Artefact, JobContext, JobError};
 use sqlx::PgPool;
@@ -8,7 +7,7 @@ use store::Store;
 
 use crate::{
     Config, Error,
-    config::MemoryConfig,
+    config::{MemoryConfig, WorkerConfig},
     database,
     objects::{self, Input},
 };
@@ -40,12 +39,29 @@ impl Resources {
         })
     }
 
-    /// What a job has taken since `started`.
-    pub fn job_report(&self, job: &JobContext, started: Instant, frames: usize) -> JobReport {
+    /// A worker loop that is set up as configured; `None` if it is to claim nothing. Before every attempt at a job it removes
+    /// what earlier ones left.
+    pub fn worker(&self, config: &WorkerConfig) -> Option<queue::WorkerBuilder> {
+        let store = self.store.clone();
+        let clean_up = move |context: JobContext| -> BoxFuture<'static, ()> {
+            let store = store.clone();
+            Box::pin(async move { objects::clean_up_earlier_attempts(&store, &context).await })
+        };
+        (config.concurrency > 0).then(|| {
+            queue::Worker::builder(self.pool.clone())
+                .name(self.worker_name.clone())
+                .concurrency(config.concurrency)
+                .grace(config.shutdown_grace)
+                .before_attempt(clean_up)
+        })
+    }
+
+    /// What a job has taken so far.
+    pub fn job_report(&self, context: &JobContext, frames: usize) -> JobReport {
         JobReport {
             worker: self.worker_name.clone(),
-            attempt: job.attempt(),
-            seconds: started.elapsed().as_secs_f64(),
+            attempt: context.attempt(),
+            seconds: context.elapsed().as_secs_f64(),
             frames,
         }
     }

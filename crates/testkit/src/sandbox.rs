@@ -17,8 +17,7 @@
 use std::{net::SocketAddr, time::Duration};
 
 use motion_db::{Clip, MotionDatabase};
-use queue::{ChildJob, NewRun, ProjectId, RunId, RunStatus};
-use serde_json::Value;
+use queue::{ChildJob, Job, NewRun, ProjectId, RunId, RunStatus};
 use service::{Config, Running};
 use sqlx::{PgPool, postgres::PgListener};
 use store::{Key, Location, Store, Stored, key};
@@ -128,22 +127,16 @@ impl Sandbox {
     }
 
     /// A run with its first job, as the gateway starts it.
-    pub async fn enqueue(
-        &self,
-        run_kind: &str,
-        session: Option<Uuid>,
-        job_kind: &str,
-        payload: Value,
-    ) -> RunId {
+    pub async fn enqueue<J: Job>(&self, run_kind: &str, session: Option<Uuid>, job: &J) -> RunId {
         let mut transaction = self.pool.begin().await.unwrap();
         let run = NewRun {
             project_id: ProjectId(self.project),
             kind: run_kind,
             session_id: session,
-            parameters: payload.clone(),
+            parameters: serde_json::to_value(job).unwrap(),
         };
         let run = queue::enqueue_run(&mut transaction, &run).await.unwrap();
-        queue::enqueue_many(&mut transaction, run, &[ChildJob::new(job_kind, payload)]).await.unwrap();
+        queue::enqueue_many(&mut transaction, run, &[ChildJob::new(job).unwrap()]).await.unwrap();
         transaction.commit().await.unwrap();
         run
     }

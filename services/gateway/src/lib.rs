@@ -13,7 +13,6 @@ mod error;
 mod extract;
 mod housekeeping;
 mod idempotency;
-pub mod jobs;
 mod live;
 mod names;
 mod observe;

@@ -9,7 +9,7 @@ use utoipa::{
     },
 };
 
-use crate::{error::Problem, names::FileRole, routes};
+use crate::{error::Problem, routes};
 
 const KEY: &str = "api_key";
 
@@ -23,7 +23,7 @@ const KEY: &str = "api_key";
                        are problem details (RFC 9457). Lists are paged: give `next` back as `cursor`.",
         license(name = "Apache-2.0", identifier = "Apache-2.0"),
     ),
-    components(schemas(Problem, FileRole)),
+    components(schemas(Problem)),
     tags(
         (name = "sessions", description = "A capture session: one take of one performer, and its files"),
         (name = "files", description = "What was uploaded to a session"),

@@ -80,7 +80,7 @@ pub struct LearnArgs {
 #[derive(Debug, clap::Args)]
 pub struct SampleArgs {
     /// The model: 'shipped', a .marey-body file, or NAME or NAME@VERSION on the server
-    #[arg(long, default_value = jobs::SHIPPED)]
+    #[arg(long, default_value = jobs::body_model::SHIPPED)]
     model: String,
     /// Stature in metres
     #[arg(long, value_name = "METRES")]
@@ -150,7 +150,7 @@ fn list(client: &Client) -> anyhow::Result<()> {
 }
 
 fn show(args: &ShowArgs) -> anyhow::Result<()> {
-    if Path::new(&args.which).is_file() || args.which == jobs::SHIPPED {
+    if Path::new(&args.which).is_file() || args.which == jobs::body_model::SHIPPED {
         let model = open(&args.which, &args.server)?;
         let measurements = model.shape(&[]).measurements(&model);
         println!("{}", model.description());
@@ -196,7 +196,7 @@ fn kept(variance: &[f64]) -> String {
 
 /// The model of a name or file.
 fn open(which: &str, server: &ServerArgs) -> anyhow::Result<BodyModel> {
-    if which == jobs::SHIPPED {
+    if which == jobs::body_model::SHIPPED {
         return Ok((*shipped().model).clone());
     }
     if Path::new(which).is_file() {

@@ -1,13 +1,12 @@
 //! The job that puts the parts of a motion database together and writes its index files.
 
 use crate::{
-    BUILD_MOTION_DATABASE,
     contents::{Clip, Contents, shares, shortened},
-    payload::BuildMotionDatabase,
     plan_job::no_database,
     shards,
     sources::Sources,
 };
+use jobs::motion_database::BuildMotionDatabase;
 use library::{
     AllCores,
     motion_database::{INDEX, SHARDS, Shard, ShardList, ShardedClip},
@@ -15,10 +14,10 @@ use library::{
 use motion_db::MotionDatabase;
 use queue::{Handler, JobContext, JobError, Outcome};
 use serde::Serialize;
-use service::{compute, config::MemoryConfig, objects};
-use sqlx::{PgConnection, PgPool, types::Json};
+use service::{Resources, compute, objects};
+use sqlx::{PgConnection, types::Json};
 use std::io::{BufWriter, Seek};
-use store::{Key, Store, Stored, UploadLimits, key};
+use store::{Key, Stored, UploadLimits, key};
 use tokio_util::io::ReaderStream;
 use uuid::Uuid;
 
@@ -30,33 +29,20 @@ const READ_BYTES: usize = 1 << 20;
 const SUMMARY: &str = "summary.json";
 
 pub(crate) struct BuildHandler {
-    store: Store,
-    pool: PgPool,
-    memory: MemoryConfig,
-}
-
-impl BuildHandler {
-    pub fn new(store: Store, pool: PgPool, memory: MemoryConfig) -> Self {
-        Self { store, pool, memory }
-    }
+    pub resources: Resources,
 }
 
 impl Handler for BuildHandler {
-    fn kind(&self) -> &'static str {
-        BUILD_MOTION_DATABASE
-    }
+    type Job = BuildMotionDatabase;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let payload: BuildMotionDatabase = job.payload()?;
+    async fn run(&self, context: JobContext, payload: BuildMotionDatabase) -> Result<Outcome, JobError> {
         let id = payload.motion_database.id;
-        objects::clean_up_earlier_attempts(&self.store, &job).await;
-        let own = key::motion_database_job_prefix(id, job.id().0);
-        objects::clean_up_earlier_attempts_under(&self.store, &job, &own).await;
-        job.progress(0.0, "listing clips");
-        let sources =
-            Sources::of(&job, &self.store, &self.pool, &payload, self.memory.max_build_bytes).await?;
-        let written = self.write(&job, &payload, &sources).await?;
-        job.check()?;
+        let own = key::motion_database_job_prefix(id, context.id().0);
+        objects::clean_up_earlier_attempts_under(&self.resources.store, &context, &own).await;
+        context.progress(0.0, "listing clips");
+        let sources = Sources::find(&context, &self.resources, &payload).await?;
+        let written = self.write(&context, &payload, &sources).await?;
+        context.check()?;
         let clips: Vec<Clip> = sources.clips.into_iter().map(|listed| listed.clip).collect();
         let contents = Contents {
             frame_rate_hz: motion_db::FRAME_RATE,
@@ -69,8 +55,10 @@ impl Handler for BuildHandler {
         };
         let num_poses = clips.iter().map(|clip| clip.num_poses).sum();
         let ready = Ready { id, written, num_poses, contents, clips };
-        let summary = serde_json::to_vec_pretty(&Summary::of(&ready)).map_err(JobError::retry)?;
-        let summary = objects::write_result(&self.store, &job, SUMMARY, "application/json", summary).await?;
+        let summary = serde_json::to_vec_pretty(&Summary::from(&ready)).map_err(JobError::retry)?;
+        let summary =
+            objects::write_result(&self.resources.store, &context, SUMMARY, "application/json", summary)
+                .await?;
         Ok(Outcome::default().artefact(summary).on_complete(move |connection| {
             let ready = ready.clone();
             Box::pin(async move { set_ready(connection, &ready).await })
@@ -95,7 +83,7 @@ impl BuildHandler {
     /// Writes one shard after the other; what is held at a time is one of them and a source.
     async fn write(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         payload: &BuildMotionDatabase,
         sources: &Sources,
     ) -> Result<Written, JobError> {
@@ -110,7 +98,7 @@ impl BuildHandler {
         let mut stored = Vec::with_capacity(num_shards);
         let mut last = None;
         for shard in 0..num_shards {
-            let mut database = self.gather(job, payload, sources, &shard_of, (shard, num_shards)).await?;
+            let mut database = self.gather(context, payload, sources, &shard_of, (shard, num_shards)).await?;
             if num_shards == 1 {
                 // Shards keep what was recorded: zero poses are learned of all performers at once, when they are put together.
                 database = compute::run(move || {
@@ -120,9 +108,9 @@ impl BuildHandler {
                 .await?;
             }
             let (skeleton, num_dofs) = (database.skeleton().clone(), database.num_dofs());
-            job.progress((shard as f64 + 0.9) / num_shards as f64, "writing the index");
+            context.progress((shard as f64 + 0.9) / num_shards as f64, "writing the index");
             let name = if num_shards == 1 { INDEX.to_owned() } else { format!("{shard:03}.mdb") };
-            stored.push(self.put_index(job, payload, &name, database).await?);
+            stored.push(self.put_index(context, payload, &name, database).await?);
             last = Some((skeleton, num_dofs));
         }
         let Some((skeleton, num_dofs)) = last else { return Err(JobError::retry("no shard was written")) };
@@ -132,7 +120,7 @@ impl BuildHandler {
             Err(several) => {
                 let list =
                     serde_json::to_vec(&list(sources, &shard_of, &several)).map_err(JobError::retry)?;
-                self.put(job, payload, SHARDS, list).await?
+                self.put(context, payload, SHARDS, list).await?
             }
         };
         let (skeleton, num_joints) = (skeleton.name().to_owned(), skeleton.num_joints());
@@ -142,7 +130,7 @@ impl BuildHandler {
     /// The clips of shard `shard` of so many, from all sources.
     async fn gather(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         payload: &BuildMotionDatabase,
         sources: &Sources,
         shard_of: &[usize],
@@ -152,12 +140,12 @@ impl BuildHandler {
             sources.clips.iter().zip(shard_of).filter(|(_, s)| **s == shard).map(|(c, _)| c).collect();
         let num_poses: usize = wanted.iter().map(|listed| listed.clip.num_poses).sum();
         let mut gathered: Option<MotionDatabase> = None;
-        for of_source in wanted.chunk_by(|a, b| a.source == b.source) {
-            job.check()?;
-            let source = of_source[0].source;
+        for listed in wanted.chunk_by(|a, b| a.source == b.source) {
+            context.check()?;
+            let source = listed[0].source;
             let done = (shard as f64 + 0.8 * source as f64 / sources.files.len() as f64) / num_shards as f64;
-            job.progress(done, format!("putting {} clips together", sources.clips.len()));
-            let part = sources.open(source, &self.store, payload, self.memory.max_build_bytes).await?;
+            context.progress(done, format!("putting {} clips together", sources.clips.len()));
+            let part = sources.open(source, &self.resources, payload).await?;
             let mut database = match gathered.take() {
                 Some(database) => database,
                 None => {
@@ -166,7 +154,7 @@ impl BuildHandler {
                 }
             };
             let clips: Vec<(usize, String)> =
-                of_source.iter().map(|listed| (listed.index, listed.clip.name.clone())).collect();
+                listed.iter().map(|listed| (listed.index, listed.clip.name.clone())).collect();
             let appended = compute::run(move || {
                 for (index, name) in clips {
                     database.append_from(&part, index, &name)?;
@@ -186,7 +174,7 @@ impl BuildHandler {
         payload: &BuildMotionDatabase,
     ) -> Result<(), JobError> {
         let needed = (num_poses * (2 * num_dofs * size_of::<f32>() + WRITING_BYTES)) as u64;
-        let limit = self.memory.max_build_bytes;
+        let limit = self.resources.memory.max_build_bytes;
         if needed <= limit {
             return Ok(());
         }
@@ -202,7 +190,7 @@ impl BuildHandler {
     /// Writes an index file with its windows, by way of a file: it is several times as large as the database.
     async fn put_index(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         payload: &BuildMotionDatabase,
         name: &str,
         database: MotionDatabase,
@@ -218,24 +206,24 @@ impl BuildHandler {
         });
         let file = ReaderStream::with_capacity(tokio::fs::File::from_std(file.await?), READ_BYTES);
         let limits = UploadLimits { max_bytes: u64::MAX, expected_blake3: None };
-        let key = self.key(job, payload, name)?;
-        self.store.put_stream(&key, file, &limits).await.map_err(JobError::retry)
+        let key = self.key(context, payload, name)?;
+        self.resources.store.put_stream(&key, file, &limits).await.map_err(JobError::retry)
     }
 
-    fn key(&self, job: &JobContext, payload: &BuildMotionDatabase, name: &str) -> Result<Key, JobError> {
+    fn key(&self, context: &JobContext, payload: &BuildMotionDatabase, name: &str) -> Result<Key, JobError> {
         let id = payload.motion_database.id;
-        key::motion_database(id, job.id().0, job.lease_number().0, name).map_err(JobError::retry)
+        key::motion_database(id, context.id().0, context.lease_number().0, name).map_err(JobError::retry)
     }
 
     async fn put(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         payload: &BuildMotionDatabase,
         name: &str,
         bytes: Vec<u8>,
     ) -> Result<Stored, JobError> {
-        let key = self.key(job, payload, name)?;
-        self.store.put(&key, bytes.into()).await.map_err(JobError::retry)
+        let key = self.key(context, payload, name)?;
+        self.resources.store.put(&key, bytes.into()).await.map_err(JobError::retry)
     }
 }
 
@@ -272,8 +260,8 @@ struct Summary<'a> {
     clips: &'a [Clip],
 }
 
-impl<'a> Summary<'a> {
-    fn of(ready: &'a Ready) -> Self {
+impl<'a> From<&'a Ready> for Summary<'a> {
+    fn from(ready: &'a Ready) -> Self {
         Self {
             num_poses: ready.num_poses,
             skeleton: &ready.written.skeleton,

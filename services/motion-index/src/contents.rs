@@ -1,7 +1,6 @@
 //! What is in a motion database: what people are told of it.
 
-use crate::payload::PartClip;
-use jobs::Augment;
+use jobs::motion_database::{Augment, PartClip};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

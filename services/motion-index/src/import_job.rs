@@ -1,17 +1,17 @@
 //! The job that reads the motion files of one part and brings them into the coordinates of the database.
 
 use crate::{
-    IMPORT_MOTION,
     inputs::{self, Reader},
-    payload::{ImportMotion, PartClip, PartReport},
     plan_job::no_database,
 };
 use bytes::Bytes;
-use jobs::Object;
+use jobs::{
+    Object,
+    motion_database::{ImportMotion, PartClip, PartReport},
+};
 use motion_db::{Augment, MotionDatabase};
 use queue::{Handler, JobContext, JobError, Outcome};
-use service::{compute, objects};
-use store::Store;
+use service::{Resources, compute, objects};
 
 /// The artefact that holds the part: a database; there is none if all clips were too short.
 pub(crate) const PART: &str = "part.mdb";
@@ -19,40 +19,35 @@ pub(crate) const PART: &str = "part.mdb";
 pub(crate) const REPORT: &str = "part.json";
 
 pub(crate) struct ImportHandler {
-    store: Store,
+    pub resources: Resources,
 }
 
 impl ImportHandler {
-    pub fn new(store: Store) -> Self {
-        Self { store }
-    }
-
     async fn read(&self, name: &str, object: &Object) -> Result<Bytes, JobError> {
         let input = objects::Input { name, store_key: &object.store_key, blake3: &object.blake3 };
-        objects::read(&self.store, input, u64::MAX).await
+        objects::read(&self.resources.store, input, u64::MAX).await
     }
 }
 
 impl Handler for ImportHandler {
-    fn kind(&self) -> &'static str {
-        IMPORT_MOTION
-    }
+    type Job = ImportMotion;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        objects::clean_up_earlier_attempts(&self.store, &job).await;
-        let payload: ImportMotion = job.payload()?;
+    async fn run(&self, context: JobContext, payload: ImportMotion) -> Result<Outcome, JobError> {
         let basis = self.read("the basis", &payload.basis).await?;
         let skeletons = self.read("the skeletons", &payload.skeletons).await?;
         let motions = self.read("the motions", &payload.motions).await?;
-        let of = job.clone();
+        let watched = context.clone();
         let (part, report) =
-            compute::run(move || import(&basis, &skeletons, &motions, &payload, &of)).await?;
-        job.check()?;
+            compute::run(move || import(&basis, &skeletons, &motions, &payload, &watched)).await?;
+        context.check()?;
         let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
-        let report = objects::write(&self.store, &job, REPORT, "application/json", report).await?;
+        let report =
+            objects::write(&self.resources.store, &context, REPORT, "application/json", report).await?;
         let mut outcome = Outcome::default().artefact(report);
         if let Some(part) = part {
-            let part = objects::write(&self.store, &job, PART, "application/octet-stream", part).await?;
+            let part =
+                objects::write(&self.resources.store, &context, PART, "application/octet-stream", part)
+                    .await?;
             outcome = outcome.artefact(part);
         }
         Ok(outcome)
@@ -64,7 +59,7 @@ fn import(
     skeletons: &[u8],
     motions: &[u8],
     payload: &ImportMotion,
-    job: &JobContext,
+    context: &JobContext,
 ) -> Result<(Option<Vec<u8>>, PartReport), JobError> {
     let basis = MotionDatabase::from_bytes(basis).map_err(JobError::retry)?;
     let motions = inputs::unpack_packed(motions)?;
@@ -74,8 +69,8 @@ fn import(
     let mut report = PartReport::default();
     let num_files = motions.len();
     for (file, motion) in motions.into_iter().enumerate() {
-        job.check()?;
-        job.progress(file as f64 / num_files as f64, format!("reading {}", motion.name));
+        context.check()?;
+        context.progress(file as f64 / num_files as f64, format!("reading {}", motion.name));
         let (clip, warnings) = reader.clip(motion)?;
         report.warnings.extend(warnings);
         let Some(clip) = clip else { continue };

@@ -21,7 +21,7 @@ pub(crate) enum Use {
 
 impl Use {
     /// By name; what systems hide in archives is of no use.
-    pub fn of(name: &str) -> Self {
+    pub fn from_name(name: &str) -> Self {
         let lower = name.to_ascii_lowercase();
         let (folder, file) = lower.rsplit_once('/').unwrap_or(("", &lower));
         if file.starts_with('.') || folder.split('/').any(|f| f.starts_with('.') || f == "__macosx") {
@@ -158,7 +158,7 @@ mod tests {
             ("amc", Use::None),
             ("", Use::None),
         ] {
-            assert_eq!(Use::of(name), expected, "{name}");
+            assert_eq!(Use::from_name(name), expected, "{name}");
         }
     }
 

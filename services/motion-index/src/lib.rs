@@ -19,7 +19,6 @@ mod error;
 mod fan_out;
 mod import_job;
 mod inputs;
-mod payload;
 mod peers;
 mod plan_job;
 mod rpc;
@@ -34,16 +33,10 @@ use databases::Databases;
 use fan_out::FanOut;
 use peers::Peers;
 use proto::v1::motion_index_server::MotionIndexServer;
-use service::{Config, Parts, Running};
+use service::{Config, Parts, Resources, Running};
 use std::net::SocketAddr;
-use store::Store;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
-
-/// Reads the motion files of one part of a database.
-pub const IMPORT_MOTION: &str = "import-motion";
-/// Puts the parts of a database together.
-pub const BUILD_MOTION_DATABASE: &str = "build-motion-database";
 
 /// Name of the service in logs and in the queue.
 pub const NAME: &str = "motion-index";
@@ -58,22 +51,21 @@ pub const DEFAULT_LISTEN: SocketAddr =
 /// If the address, the store or the database's URL can't be used. A database that does not answer yet is
 /// waited for.
 pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Running, service::Error> {
-    let pool = service::database::pool(&config.database)?;
-    let store = Store::open(&config.store)?;
+    let resources = Resources::open(&config, NAME)?;
+    let pool = resources.pool.clone();
     let peers = Peers::new(&config.peers).map_err(|error| service::Error::BadValue {
         name: "MAREY_MOTION_INDEX_PEERS",
         found: error.found,
         expected: format!("addresses such as http://10.0.0.7:50051: {}", error.reason),
     })?;
-    let databases = Databases::new(pool.clone(), store.clone(), &config.memory);
+    let databases = Databases::new(pool.clone(), resources.store.clone(), &config.memory);
     let routes = Routes::new(MotionIndexServer::new(rpc::Rpc::new(FanOut { databases, peers })));
-    let memory = &config.memory;
-    let builder = config.worker.builder(NAME, &pool).map(|builder| {
+    let builder = resources.worker(&config.worker).map(|builder| {
         builder
-            .handler(plan_job::PlanHandler::new(store.clone(), memory.clone()))
-            .handler(import_job::ImportHandler::new(store.clone()))
-            .handler(build_job::BuildHandler::new(store.clone(), pool.clone(), memory.clone()))
-            .handler(train_job::TrainHandler::new(store, memory.clone()))
+            .handler(plan_job::PlanHandler { resources: resources.clone() })
+            .handler(import_job::ImportHandler { resources: resources.clone() })
+            .handler(build_job::BuildHandler { resources: resources.clone() })
+            .handler(train_job::TrainHandler { resources })
     });
     let parts = Parts {
         name: NAME,

@@ -1,18 +1,16 @@
 //! The job that divides the files of a motion database into parts, and decides the coordinates that all parts have.
 
-use crate::{
-    BUILD_MOTION_DATABASE, IMPORT_MOTION,
-    inputs::{self, Reader, Use},
-    payload::{BuildMotionDatabase, ImportMotion},
-};
+use crate::inputs::{self, Reader, Use};
 use formats::archive::Entry;
-use jobs::{MotionDatabaseFile, Object, PLAN_MOTION_DATABASE, PlanMotionDatabase};
+use jobs::{
+    Object,
+    motion_database::{BuildMotionDatabase, ImportMotion, MotionDatabaseFile, PlanMotionDatabase},
+};
 use library::{motion_database, motion_database::Index};
 use motion_db::MotionDatabase;
 use queue::{Artefact, ChildJob, Handler, JobContext, JobError, Outcome};
-use service::{compute, config::MemoryConfig, objects};
+use service::{Resources, compute, objects};
 use std::sync::Arc;
-use store::Store;
 
 /// Progress when all files were looked into: imports and build, most of the work, are not counted before that.
 const PLANNED: f64 = 0.1;
@@ -25,54 +23,40 @@ const PART_BYTES: usize = 32 << 20;
 const MAX_SUPPORT_BYTES: usize = 64 << 20;
 /// Clips that the coordinates are taken from, at most.
 const SAMPLE_CLIPS: usize = 24;
-/// Attempts of an import: more than usual, as one may be lost with each worker that is taken away.
-const IMPORT_ATTEMPTS: i32 = 5;
 const TAR: &str = "application/x-tar";
 
 pub(crate) struct PlanHandler {
-    store: Store,
-    memory: MemoryConfig,
-}
-
-impl PlanHandler {
-    pub fn new(store: Store, memory: MemoryConfig) -> Self {
-        Self { store, memory }
-    }
+    pub resources: Resources,
 }
 
 impl Handler for PlanHandler {
-    fn kind(&self) -> &'static str {
-        PLAN_MOTION_DATABASE
-    }
+    type Job = PlanMotionDatabase;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        objects::clean_up_earlier_attempts(&self.store, &job).await;
-        let request: PlanMotionDatabase = job.payload()?;
-        let divided = self.divide(&job, &request).await?;
+    async fn run(&self, context: JobContext, request: PlanMotionDatabase) -> Result<Outcome, JobError> {
+        let store = &self.resources.store;
+        let divided = self.divide(&context, &request).await?;
         let mut outcome = Outcome::default();
         let mut imports = Vec::new();
         if !divided.parts.is_empty() {
-            job.progress(PLANNED, "choosing coordinates");
+            context.progress(PLANNED, "choosing coordinates");
             let basis = match &request.base {
                 Some(base) => self.base(base).await?,
-                None => self.sampled(&job, &divided, request.bvh_metres_per_unit).await?,
+                None => self.sampled(&context, &divided, request.bvh_metres_per_unit).await?,
             };
             let basis = compute::run(move || one_clip(&basis)).await?;
             let skeletons = divided.skeletons.clone();
             let skeletons = compute::run(move || inputs::pack(&skeletons)).await?;
             let basis =
-                objects::write(&self.store, &job, "basis.mdb", "application/octet-stream", basis).await?;
-            let skeletons = objects::write(&self.store, &job, "skeletons.tar", TAR, skeletons).await?;
+                objects::write(store, &context, "basis.mdb", "application/octet-stream", basis).await?;
+            let skeletons = objects::write(store, &context, "skeletons.tar", TAR, skeletons).await?;
             for part in &divided.parts {
-                let payload = ImportMotion {
-                    basis: object(&basis),
-                    skeletons: object(&skeletons),
-                    motions: object(part),
+                imports.push(ChildJob::new(&ImportMotion {
+                    basis: Object::from(&basis),
+                    skeletons: Object::from(&skeletons),
+                    motions: Object::from(part),
                     augment: request.augment.clone(),
                     bvh_metres_per_unit: request.bvh_metres_per_unit,
-                };
-                let payload = serde_json::to_value(payload).map_err(JobError::retry)?;
-                imports.push(ChildJob::new(IMPORT_MOTION, payload).max_attempts(IMPORT_ATTEMPTS));
+                })?);
             }
             outcome = outcome.artefact(basis).artefact(skeletons);
         }
@@ -83,9 +67,8 @@ impl Handler for PlanHandler {
             augment: request.augment,
             shards: request.shards,
         };
-        let build = serde_json::to_value(build).map_err(JobError::retry)?;
         let num_imports = imports.len();
-        imports.push(ChildJob::new(BUILD_MOTION_DATABASE, build).depends_on(0..num_imports));
+        imports.push(ChildJob::new(&build)?.depends_on(0..num_imports));
         Ok(divided.parts.into_iter().fold(outcome, Outcome::artefact).children(imports))
     }
 }
@@ -111,28 +94,28 @@ struct Place {
 
 impl PlanHandler {
     /// Unpacks one file after the other; what is held at a time is one of them and a part.
-    async fn divide(&self, job: &JobContext, request: &PlanMotionDatabase) -> Result<Divided, JobError> {
-        let mut left = self.memory.max_input_bytes;
+    async fn divide(&self, context: &JobContext, request: &PlanMotionDatabase) -> Result<Divided, JobError> {
+        let memory = &self.resources.memory;
+        let mut left = memory.max_input_bytes;
         let mut divided = Divided::default();
         let mut num_entries = 0;
         for (done, file) in request.files.iter().enumerate() {
-            job.check()?;
-            job.progress(
+            context.check()?;
+            context.progress(
                 PLANNED * done as f64 / request.files.len() as f64,
                 format!("reading {}", file.name),
             );
-            let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
-            let bytes = objects::read(&self.store, input, self.memory.max_object_bytes).await?;
-            let (name, most) = (file.name.clone(), left.min(self.memory.max_build_bytes));
+            let bytes = self.resources.read_file(file, memory.max_object_bytes).await?;
+            let (name, most) = (file.name.clone(), left.min(memory.max_build_bytes));
             let mut entries = compute::run(move || inputs::unpack(&name, &bytes, most)).await?;
             left = left.saturating_sub(entries.iter().map(|e| e.bytes.len() as u64).sum());
             num_entries += entries.len();
             entries.sort_by(|a, b| a.name.cmp(&b.name));
             for entry in entries {
-                self.place(job, &mut divided, entry).await?;
+                self.place(context, &mut divided, entry).await?;
             }
         }
-        self.close_part(job, &mut divided).await?;
+        self.close_part(context, &mut divided).await?;
         if divided.motions.is_empty() && request.base.is_none() {
             let message = format!(
                 "found {num_entries} files, no motion among them; expected at least one AMC file with its ASF file, or a \
@@ -143,8 +126,8 @@ impl PlanHandler {
         Ok(divided)
     }
 
-    async fn place(&self, job: &JobContext, divided: &mut Divided, entry: Entry) -> Result<(), JobError> {
-        match Use::of(&entry.name) {
+    async fn place(&self, context: &JobContext, divided: &mut Divided, entry: Entry) -> Result<(), JobError> {
+        match Use::from_name(&entry.name) {
             Use::None => {}
             Use::Support => {
                 divided.support_bytes += entry.bytes.len();
@@ -165,14 +148,14 @@ impl PlanHandler {
                 divided.open.push(entry);
                 divided.open_bytes += bytes;
                 if divided.open.len() == PART_FILES || divided.open_bytes >= PART_BYTES {
-                    self.close_part(job, divided).await?;
+                    self.close_part(context, divided).await?;
                 }
             }
         }
         Ok(())
     }
 
-    async fn close_part(&self, job: &JobContext, divided: &mut Divided) -> Result<(), JobError> {
+    async fn close_part(&self, context: &JobContext, divided: &mut Divided) -> Result<(), JobError> {
         let entries = std::mem::take(&mut divided.open);
         divided.open_bytes = 0;
         if entries.is_empty() {
@@ -180,14 +163,14 @@ impl PlanHandler {
         }
         let bytes = compute::run(move || inputs::pack(&entries)).await?;
         let name = format!("motions-{:05}.tar", divided.parts.len());
-        divided.parts.push(objects::write(&self.store, job, &name, TAR, bytes).await?);
+        divided.parts.push(objects::write(&self.resources.store, context, &name, TAR, bytes).await?);
         Ok(())
     }
 
     /// A database of clips from all over the files, for its coordinates.
     async fn sampled(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         divided: &Divided,
         bvh_metres_per_unit: f64,
     ) -> Result<Arc<MotionDatabase>, JobError> {
@@ -200,11 +183,11 @@ impl PlanHandler {
             .collect();
         let mut reader = Reader::new(divided.skeletons.clone(), bvh_metres_per_unit);
         let mut clips = Vec::new();
-        for of_part in chosen.chunk_by(|a, b| a.part == b.part) {
-            job.check()?;
-            let part = &divided.parts[of_part[0].part];
-            let bytes = read_artefact(&self.store, part).await?;
-            let indices: Vec<usize> = of_part.iter().map(|place| place.index).collect();
+        for places in chosen.chunk_by(|a, b| a.part == b.part) {
+            context.check()?;
+            let part = &divided.parts[places[0].part];
+            let bytes = self.resources.read_artefact(part, u64::MAX).await?;
+            let indices: Vec<usize> = places.iter().map(|place| place.index).collect();
             (reader, clips) = compute::run(move || {
                 let mut entries = inputs::unpack_packed(&bytes)?;
                 for index in indices {
@@ -221,15 +204,15 @@ impl PlanHandler {
     }
 
     async fn base(&self, base: &MotionDatabaseFile) -> Result<Arc<MotionDatabase>, JobError> {
-        let most = self.memory.max_build_bytes;
+        let (store, most) = (&self.resources.store, self.resources.memory.max_build_bytes);
         let read = async {
             // All shards have the same coordinates.
-            let shard = match motion_database::read(&self.store, &base.store_key, &base.blake3, most).await? {
+            let shard = match motion_database::read(store, &base.store_key, &base.blake3, most).await? {
                 Index::Whole(file) => Some(file),
                 Index::Sharded(list) => list.shards.into_iter().next(),
             };
             let shard = shard.ok_or_else(|| motion_database::Error::List("is empty".to_owned()))?;
-            shard.open(&self.store, most).await
+            shard.open(store, most).await
         };
         Ok(read.await.map_err(|error| error.into_job_error(&full_name(base)))?.database)
     }
@@ -251,15 +234,4 @@ pub(crate) fn no_database(error: &motion_db::Error) -> JobError {
 /// A motion database as people name it.
 pub(crate) fn full_name(database: &MotionDatabaseFile) -> String {
     format!("{}@{}", database.name, database.version)
-}
-
-/// What an earlier job, or this one, wrote.
-pub(crate) async fn read_artefact(store: &Store, artefact: &Artefact) -> Result<bytes::Bytes, JobError> {
-    let input =
-        objects::Input { name: &artefact.name, store_key: &artefact.store_key, blake3: &artefact.blake3 };
-    objects::read(store, input, u64::MAX).await
-}
-
-fn object(artefact: &Artefact) -> Object {
-    Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() }
 }

@@ -3,16 +3,14 @@
 use crate::{
     contents::{Clip, Names, names},
     import_job::{PART, REPORT},
-    payload::{BuildMotionDatabase, PartReport},
-    plan_job::{full_name, read_artefact},
+    plan_job::full_name,
 };
+use jobs::motion_database::{BuildMotionDatabase, PartReport};
 use library::{motion_database, motion_database::Shard};
 use motion_db::{MotionDatabase, trial_of};
 use queue::{Artefact, JobContext, JobError};
-use service::compute;
-use sqlx::PgPool;
+use service::{Resources, compute};
 use std::{collections::BTreeSet, sync::Arc};
-use store::Store;
 
 /// A file that holds clips in the coordinates of the database.
 pub(crate) enum Source {
@@ -44,23 +42,21 @@ impl Sources {
     ///
     /// # Errors
     /// If the base can't be read; tries again where an artefact can't.
-    pub async fn of(
-        job: &JobContext,
-        store: &Store,
-        pool: &PgPool,
+    pub async fn find(
+        context: &JobContext,
+        resources: &Resources,
         payload: &BuildMotionDatabase,
-        max_bytes: u64,
     ) -> Result<Self, JobError> {
         let mut sources = Self::default();
-        sources.add_base(store, payload, max_bytes).await?;
-        let mut connection = pool.acquire().await?;
-        let artefacts = queue::dependency_artefacts(&mut connection, job.id()).await?;
+        sources.add_base(resources, payload).await?;
+        let mut connection = resources.pool.acquire().await?;
+        let artefacts = queue::dependency_artefacts(&mut connection, context.id()).await?;
         drop(connection);
         for left in artefacts.chunk_by(|a, b| a.job_id == b.job_id) {
-            job.check()?;
+            context.check()?;
             let named = |name: &str| left.iter().map(|a| &a.artefact).find(|a| a.name == name);
             let Some(report) = named(REPORT) else { continue };
-            let report = read_artefact(store, report).await?;
+            let report = resources.read_artefact(report, u64::MAX).await?;
             let report: PartReport = serde_json::from_slice(&report).map_err(JobError::retry)?;
             sources.add_part(report, named(PART));
         }
@@ -69,11 +65,11 @@ impl Sources {
 
     async fn add_base(
         &mut self,
-        store: &Store,
+        resources: &Resources,
         payload: &BuildMotionDatabase,
-        max_bytes: u64,
     ) -> Result<(), JobError> {
         use motion_database::Index;
+        let (store, max_bytes) = (&resources.store, resources.memory.max_build_bytes);
         let Some(base) = &payload.base else { return Ok(()) };
         let failed = |error: motion_database::Error| error.into_job_error(&full_name(base));
         let shards = match motion_database::read(store, &base.store_key, &base.blake3, max_bytes).await {
@@ -121,18 +117,17 @@ impl Sources {
     pub async fn open(
         &self,
         source: usize,
-        store: &Store,
+        resources: &Resources,
         payload: &BuildMotionDatabase,
-        max_bytes: u64,
     ) -> Result<Arc<MotionDatabase>, JobError> {
         match (&self.files[source], &payload.base) {
             (Source::Base(shard), Some(base)) => {
-                let opened = shard.open(store, max_bytes).await;
+                let opened = shard.open(&resources.store, resources.memory.max_build_bytes).await;
                 Ok(opened.map_err(|error| error.into_job_error(&full_name(base)))?.database)
             }
             (Source::Base(_), None) => Err(JobError::retry("an index file of no base")),
             (Source::Part(artefact), _) => {
-                let bytes = read_artefact(store, artefact).await?;
+                let bytes = resources.read_artefact(artefact, u64::MAX).await?;
                 let part = compute::run(move || MotionDatabase::from_bytes(&bytes)).await;
                 Ok(part.map_err(JobError::retry)?.into())
             }

@@ -1,63 +1,51 @@
 //! The job that trains a latent variable model of poses on a motion database.
 
 use crate::plan_job::full_name;
-use jobs::{TRAIN_GPLVM, TrainGplvm};
+use jobs::motion_database::TrainGplvm;
 use library::motion_database;
 use queue::{Handler, JobContext, JobError, Outcome};
-use regression::gplvm::TrainingOptions;
-use service::{compute, config::MemoryConfig, objects};
-use sqlx::PgConnection;
+use service::{Resources, compute, objects};
+use sqlx::{PgConnection, types::Json};
 use std::ops::ControlFlow;
-use store::{Store, Stored, key};
+use store::{Stored, key};
 
 /// Name of the model in the object store.
 const MODEL: &str = "gplvm.model";
 
 pub(crate) struct TrainHandler {
-    store: Store,
-    memory: MemoryConfig,
-}
-
-impl TrainHandler {
-    pub fn new(store: Store, memory: MemoryConfig) -> Self {
-        Self { store, memory }
-    }
+    pub resources: Resources,
 }
 
 impl Handler for TrainHandler {
-    fn kind(&self) -> &'static str {
-        TRAIN_GPLVM
-    }
+    type Job = TrainGplvm;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let request: TrainGplvm = job.payload()?;
+    async fn run(&self, context: JobContext, request: TrainGplvm) -> Result<Outcome, JobError> {
+        let Resources { store, memory, .. } = &self.resources;
         let file = &request.motion_database;
-        let own = key::motion_database_job_prefix(file.id, job.id().0);
-        objects::clean_up_earlier_attempts_under(&self.store, &job, &own).await;
-        let options: TrainingOptions = serde_json::from_value(request.parameters.clone())
-            .map_err(|e| JobError::give_up(format!("parameters: {e}"), ""))?;
-        job.progress(0.0, "reading the motion database");
-        let most = self.memory.database_cache_bytes;
-        let opened = motion_database::open(&self.store, &file.store_key, &file.blake3, most).await;
+        let own = key::motion_database_job_prefix(file.id, context.id().0);
+        objects::clean_up_earlier_attempts_under(store, &context, &own).await;
+        context.progress(0.0, "reading the motion database");
+        let most = memory.database_cache_bytes;
+        let opened = motion_database::open(store, &file.store_key, &file.blake3, most).await;
         let database = opened.map_err(|error| error.into_job_error(&full_name(file)))?.database;
-        let of = job.clone();
+        let (watched, options) = (context.clone(), request.parameters);
         let model = compute::run(move || {
             let mut progress = |done: usize, planned: usize| {
-                of.progress(0.95 * done as f64 / planned.max(1) as f64, "training");
-                if of.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                watched.progress(0.95 * done as f64 / planned.max(1) as f64, "training");
+                if watched.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
             let model = sparse::train_gplvm(&database, &options, &|_| false, &mut progress);
             model.map(|model| model.to_bytes())
         });
         let model = model.await;
-        job.check()?;
+        context.check()?;
         let model =
             model.map_err(|e| JobError::give_up(format!("training failed: {e}"), format!("{e:?}")))?;
-        job.progress(0.95, "storing the model");
-        let key = key::motion_database(file.id, job.id().0, job.lease_number().0, MODEL)
+        context.progress(0.95, "storing the model");
+        let key = key::motion_database(file.id, context.id().0, context.lease_number().0, MODEL)
             .map_err(JobError::retry)?;
-        let stored = self.store.put(&key, model.into()).await.map_err(JobError::retry)?;
-        let run = job.run_id().0;
+        let stored = store.put(&key, model.into()).await.map_err(JobError::retry)?;
+        let run = context.run_id().0;
         Ok(Outcome::default().on_complete(move |connection| {
             let (request, stored) = (request.clone(), stored.clone());
             Box::pin(async move { record(connection, run, &request, &stored).await })
@@ -82,7 +70,7 @@ async fn record(
     let recorded = sqlx::query(sql)
         .bind(request.motion_database.id)
         .bind(run)
-        .bind(&request.parameters)
+        .bind(Json(&request.parameters))
         .bind(stored.key.as_str())
         .bind(i64::try_from(stored.bytes).unwrap_or(i64::MAX))
         .bind(&stored.blake3)

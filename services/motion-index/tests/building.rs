@@ -3,9 +3,10 @@
 mod fixture;
 
 use fixture::{Fixture, plan};
-use jobs::{Augment, MotionDatabaseFile, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm};
+use jobs::motion_database::{Augment, MotionDatabaseFile, PlanMotionDatabase, TrainGplvm};
 use motion_db::{MotionDatabase, trial_of};
 use queue::RunState;
+use regression::gplvm::TrainingOptions;
 use serde_json::{Value, json};
 use testkit::walker;
 use uuid::Uuid;
@@ -154,10 +155,10 @@ async fn a_model_is_trained_and_recorded_with_its_database() {
     let fixture = Fixture::new().await;
     let id = fixture.build_walks(&[1, 2]).await;
     let file = fixture.file(id).await;
-    let parameters = json!({"latent_dims": 2, "active": 32, "max_iterations": 5});
+    let parameters = TrainingOptions { latent_dims: 2, active: 32, max_iterations: 5 };
     let train = TrainGplvm { motion_database: file.clone(), parameters };
     for _ in 0..2 {
-        let run = fixture.run(TRAIN_GPLVM, serde_json::to_value(&train).unwrap()).await;
+        let run = fixture.run(&train).await;
         assert_eq!(run.state, RunState::Succeeded, "{:?}", run.error_message);
     }
     let models: Vec<(String, String, String)> = sqlx::query_as(
@@ -173,8 +174,8 @@ async fn a_model_is_trained_and_recorded_with_its_database() {
     let bytes = fixture.store.get_checked(&store_key.parse().unwrap(), blake3, 1 << 24).await.unwrap();
     regression::gplvm::Gplvm::from_bytes(&bytes).unwrap();
 
-    let bad = TrainGplvm { parameters: json!({"latent_dims": 99}), ..train };
-    let run = fixture.run(TRAIN_GPLVM, serde_json::to_value(&bad).unwrap()).await;
+    let bad = TrainGplvm { parameters: TrainingOptions { latent_dims: 99, ..parameters }, ..train };
+    let run = fixture.run(&bad).await;
     assert_eq!(run.state, RunState::Failed);
     assert!(run.error_message.unwrap().contains("latent_dims"));
     fixture.stop().await;

@@ -3,7 +3,7 @@
 mod fixture;
 
 use fixture::{Fixture, plan};
-use jobs::PlanMotionDatabase;
+use jobs::motion_database::PlanMotionDatabase;
 use proto::v1::{self, motion_index_client::MotionIndexClient};
 use std::net::{SocketAddr, TcpListener};
 use testkit::walker;

@@ -1,5 +1,6 @@
 //! What is wrong with a session's files or with a question.
 
+use formats::FileRole;
 use proto::ErrorCode;
 use queue::JobError;
 use uuid::Uuid;
@@ -22,7 +23,7 @@ pub enum InputError {
         /// Name of the file.
         file: String,
         /// Its role.
-        role: &'static str,
+        role: FileRole,
         /// What it may be.
         expected: &'static str,
     },
@@ -30,7 +31,7 @@ pub enum InputError {
     #[error("session has {found} files of role {role}{names}, expected {expected}")]
     Count {
         /// The role.
-        role: &'static str,
+        role: FileRole,
         /// How many files.
         found: usize,
         /// Which, in brackets.

@@ -1,7 +1,8 @@
 //! How far the result is from the ground truth, when a file has it.
 
-use crate::{error::InputError, inputs, inputs::NamedBytes, payload::Reading};
+use crate::{error::InputError, inputs, inputs::NamedBytes};
 use evaluation::Errors;
+use formats::session;
 use model::{Motion, Skeleton};
 use motion_db::MotionDatabase;
 use std::sync::Arc;
@@ -28,7 +29,7 @@ pub fn truth_of(
     found: &Motion,
     files: &[NamedBytes],
     fallback: &Arc<Skeleton>,
-    reading: Reading,
+    reading: session::Options,
 ) -> Result<Truth, InputError> {
     let seconds = found.num_frames() as f64 / found.frame_rate();
     Ok(match inputs::ground_truth(files, fallback, reading, seconds)? {
@@ -46,7 +47,7 @@ pub(crate) fn errors(
     files: &[NamedBytes],
     database: &MotionDatabase,
     found: &Motion,
-    reading: Reading,
+    reading: session::Options,
 ) -> Result<Option<Errors>, InputError> {
     let Truth::Known(truth) = truth_of(found, files, database.skeleton(), reading)? else {
         return Ok(None);

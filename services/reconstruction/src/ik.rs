@@ -7,7 +7,7 @@ mod evidence;
 mod report;
 
 use inverse_kinematics::Method;
-use jobs::IkSolver;
+use jobs::inverse_kinematics::IkSolver;
 
 /// Most points of a figure that may be measured.
 const MAX_POINTS: usize = 16;

@@ -3,10 +3,12 @@
 use crate::{
     control::{self, Markers},
     error::InputError,
-    payload::Reading,
 };
 use bytes::Bytes;
-use formats::{Read, archive, asf, points_csv};
+use formats::{
+    FileRole, Read, archive, asf,
+    session::{self, MotionFormat, PointsFormat, SkeletonFormat},
+};
 use model::{Motion, PointTrajectories, Skeleton};
 use sparse::Session;
 use std::sync::Arc;
@@ -19,8 +21,8 @@ const AMC_FRAME_RATE: f64 = 120.0;
 pub struct NamedBytes {
     /// Name given by the user.
     pub name: String,
-    /// `skeleton`, `control-points` or `ground-truth`; others are not looked at.
-    pub role: String,
+    /// What it is for.
+    pub role: FileRole,
     /// The content.
     pub bytes: Bytes,
 }
@@ -51,7 +53,7 @@ pub(crate) struct Selection<'a> {
     /// What the file's names stand for.
     pub markers: &'a Markers,
     /// How the files are to be read.
-    pub reading: Reading,
+    pub reading: session::Options,
 }
 
 /// What a session's files say.
@@ -75,7 +77,7 @@ pub(crate) fn read(
     fallback: &Arc<Skeleton>,
 ) -> Result<Evidence, InputError> {
     let mut warnings = Vec::new();
-    let own = at_most_one(files, "skeleton")?;
+    let own = at_most_one(files, FileRole::Skeleton)?;
     let skeleton = match own {
         Some(file) => read_skeleton(file, selection.reading, &mut warnings)?.skeleton,
         None => fallback.clone(),
@@ -104,15 +106,16 @@ pub(crate) fn read(
 pub(crate) fn ground_truth(
     files: &[NamedBytes],
     fallback: &Arc<Skeleton>,
-    reading: Reading,
+    reading: session::Options,
     seconds: f64,
 ) -> Result<Option<Read<Motion>>, InputError> {
-    let Some(file) = at_most_one(files, "ground-truth")? else { return Ok(None) };
+    let Some(file) = at_most_one(files, FileRole::GroundTruth)? else { return Ok(None) };
     let in_file = |source| InputError::File { file: file.name.clone(), source };
-    let read = match kind(&file.name).as_str() {
-        "bvh" => formats::bvh::read(&file.bytes, &reading.bvh).map_err(in_file)?,
-        "amc" => {
-            let acclaim = match at_most_one(files, "skeleton")?.filter(|f| kind(&f.name) == "asf") {
+    let read = match MotionFormat::from_name(&file.name) {
+        Some(MotionFormat::Bvh) => formats::bvh::read(&file.bytes, &reading.bvh).map_err(in_file)?,
+        Some(MotionFormat::Amc) => {
+            let is_asf = |f: &&NamedBytes| SkeletonFormat::from_name(&f.name) == Some(SkeletonFormat::Asf);
+            let acclaim = match at_most_one(files, FileRole::Skeleton)?.filter(is_asf) {
                 Some(skeleton) => read_skeleton(skeleton, reading, &mut Vec::new())?,
                 None => asf::File { skeleton: fallback.clone(), metres_per_unit: asf::CMU_METRES_PER_UNIT },
             };
@@ -123,7 +126,7 @@ pub(crate) fn ground_truth(
                 .map_err(|e| in_file(e.into()))?;
             Read { value: motion, warnings: read.warnings }
         }
-        _ => return Err(kind_error(file, "ground-truth", "an AMC or BVH file")),
+        None => return Err(kind_error(file, "an AMC or BVH file")),
     };
     Ok(Some(read))
 }
@@ -137,19 +140,13 @@ fn amc_frame_rate(frames: usize, seconds: f64) -> f64 {
 
 fn read_skeleton(
     file: &NamedBytes,
-    reading: Reading,
+    reading: session::Options,
     warnings: &mut Vec<String>,
 ) -> Result<asf::File, InputError> {
-    let in_file = |source| InputError::File { file: file.name.clone(), source };
-    match kind(&file.name).as_str() {
-        "asf" => Ok(note(asf::read(&file.bytes).map_err(in_file)?, file, warnings)),
-        "bvh" => {
-            let motion = formats::bvh::read(&file.bytes, &reading.bvh).map_err(in_file)?;
-            let skeleton = note(motion, file, warnings).skeleton().clone();
-            Ok(asf::File { skeleton, metres_per_unit: asf::CMU_METRES_PER_UNIT })
-        }
-        _ => Err(kind_error(file, "skeleton", "an ASF or BVH file")),
-    }
+    let format =
+        SkeletonFormat::from_name(&file.name).ok_or_else(|| kind_error(file, "an ASF or BVH file"))?;
+    let read = format.read(&file.bytes, &reading);
+    Ok(note(read.map_err(|source| InputError::File { file: file.name.clone(), source })?, file, warnings))
 }
 
 /// The name of the file of measured points, and what is in it.
@@ -158,11 +155,11 @@ fn read_skeleton(
 /// If there is none, or it can't be read.
 pub(crate) fn measured_points(
     files: &[NamedBytes],
-    reading: Reading,
+    reading: session::Options,
     warnings: &mut Vec<String>,
 ) -> Result<(String, PointTrajectories), InputError> {
-    let file = at_most_one(files, "control-points")?.ok_or_else(|| InputError::Count {
-        role: "control-points",
+    let file = at_most_one(files, FileRole::ControlPoints)?.ok_or_else(|| InputError::Count {
+        role: FileRole::ControlPoints,
         found: 0,
         names: String::new(),
         expected: "one (CSV, TRC or C3D)",
@@ -172,17 +169,13 @@ pub(crate) fn measured_points(
 
 fn read_points(
     file: &NamedBytes,
-    reading: Reading,
+    reading: session::Options,
     warnings: &mut Vec<String>,
 ) -> Result<PointTrajectories, InputError> {
-    let in_file = |source| InputError::File { file: file.name.clone(), source };
-    let read = match kind(&file.name).as_str() {
-        "csv" => points_csv::read_with(&file.bytes, &reading.points),
-        "trc" => formats::trc::read(&file.bytes, &reading.points),
-        "c3d" => formats::c3d::read(&file.bytes, &reading.points),
-        _ => return Err(kind_error(file, "control-points", "a CSV, TRC or C3D file")),
-    };
-    Ok(note(read.map_err(in_file)?, file, warnings))
+    let format =
+        PointsFormat::from_name(&file.name).ok_or_else(|| kind_error(file, "a CSV, TRC or C3D file"))?;
+    let read = format.read(&file.bytes, &reading);
+    Ok(note(read.map_err(|source| InputError::File { file: file.name.clone(), source })?, file, warnings))
 }
 
 fn note<T>(read: Read<T>, file: &NamedBytes, warnings: &mut Vec<String>) -> T {
@@ -190,28 +183,18 @@ fn note<T>(read: Read<T>, file: &NamedBytes, warnings: &mut Vec<String>) -> T {
     read.value
 }
 
-fn at_most_one<'a>(
-    files: &'a [NamedBytes],
-    role: &'static str,
-) -> Result<Option<&'a NamedBytes>, InputError> {
-    let of_role: Vec<&NamedBytes> = files.iter().filter(|f| f.role == role).collect();
-    if of_role.len() > 1 {
-        let names = of_role.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
+fn at_most_one(files: &[NamedBytes], role: FileRole) -> Result<Option<&NamedBytes>, InputError> {
+    let found: Vec<&NamedBytes> = files.iter().filter(|f| f.role == role).collect();
+    if found.len() > 1 {
+        let names = found.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
         let names = format!(" ({names})");
-        return Err(InputError::Count { role, found: of_role.len(), names, expected: "one" });
+        return Err(InputError::Count { role, found: found.len(), names, expected: "one" });
     }
-    Ok(of_role.first().copied())
+    Ok(found.first().copied())
 }
 
-fn kind_error(file: &NamedBytes, role: &'static str, expected: &'static str) -> InputError {
-    InputError::Kind { file: file.name.clone(), role, expected }
-}
-
-/// Extension in lower case, without a compression's behind it.
-fn kind(name: &str) -> String {
-    let lower = name.to_ascii_lowercase();
-    let inner = lower.strip_suffix(".zst").or(lower.strip_suffix(".gz")).unwrap_or(&lower);
-    inner.rsplit_once('.').map_or(String::new(), |(_, extension)| extension.to_owned())
+fn kind_error(file: &NamedBytes, expected: &'static str) -> InputError {
+    InputError::Kind { file: file.name.clone(), role: file.role, expected }
 }
 
 #[cfg(test)]
@@ -223,11 +206,5 @@ mod tests {
         assert_eq!(amc_frame_rate(1200, 10.0), 120.0);
         assert_eq!(amc_frame_rate(601, 10.0), 60.0);
         assert_eq!(amc_frame_rate(5, 10.0), 120.0);
-    }
-
-    #[test]
-    fn kinds_are_extensions_without_compression() {
-        assert_eq!(kind("16_15.AMC.zst"), "amc");
-        assert_eq!(kind("points"), "");
     }
 }

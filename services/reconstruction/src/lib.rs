@@ -8,7 +8,7 @@
 //! (make-silhouettes × cameras ──►) solve-inverse-kinematics
 //! ```
 //!
-//! [`PLAN_SPARSE`] reads what people uploaded and writes one canonical session; nothing after it reads an upload
+//! The plan reads what people uploaded and writes one canonical session; nothing after it reads an upload
 //! again, but for the ground truth. How a session is cut depends on its length and parameters alone, so the result does
 //! not depend on how many workers there were or what happened to them.
 
@@ -22,7 +22,6 @@ mod ik;
 mod inputs;
 mod live;
 mod merge_job;
-mod payload;
 mod performer;
 mod plan_job;
 mod priors;
@@ -32,10 +31,6 @@ mod run_report;
 pub use error::InputError;
 pub use evaluate::{Truth, truth_of};
 pub use inputs::NamedBytes;
-pub use payload::{
-    InputFile, MergeChunks, MotionDatabaseFile, Object, PlanSparse, Reading, ReconstructChunk,
-};
-pub use performer::FittedReport;
 
 use camera_jobs::Models;
 use priors::Priors;
@@ -45,13 +40,6 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
-
-/// Reads a session's files and plans its chunks.
-pub const PLAN_SPARSE: &str = "plan-sparse";
-/// Reconstructs one chunk of a session.
-pub const RECONSTRUCT_CHUNK: &str = "reconstruct-chunk";
-/// Puts the chunks together and writes the results.
-pub const MERGE_CHUNKS: &str = "merge-chunks";
 
 /// Name of the service in logs and in the queue.
 pub const NAME: &str = "reconstruction";
@@ -84,12 +72,12 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
     let rpc = ReconstructionServer::new(rpc::Rpc::new(shared.clone()))
         .max_decoding_message_size(ik::call::MAX_REQUEST_BYTES);
     let routes = Routes::new(rpc).add_service(live);
-    let builder = config.worker.builder(NAME, &pool).map(|builder| {
+    let builder = shared.resources.worker(&config.worker).map(|builder| {
         builder
-            .handler(plan_job::PlanHandler::new(shared.clone()))
-            .handler(chunk_job::ChunkHandler::new(shared.clone()))
-            .handler(merge_job::MergeHandler::new(shared.clone()))
-            .handler(ik::job::IkHandler::new(shared))
+            .handler(plan_job::PlanHandler { shared: shared.clone() })
+            .handler(chunk_job::ChunkHandler { shared: shared.clone() })
+            .handler(merge_job::MergeHandler { shared: shared.clone() })
+            .handler(ik::job::IkHandler { shared })
     });
     let parts = Parts {
         name: NAME,

@@ -1,50 +1,40 @@
 //! The job that puts the chunks together and writes the results.
 
 use crate::{
-    MERGE_CHUNKS, Shared, chunk_job,
+    Shared, chunk_job,
     error::InputError,
     evaluate,
     export::EXPORTS,
     feet::{self, Finished},
-    payload::{JobReport, MergeChunks},
     plan_job,
     run_report::{RUN, RunReport},
 };
+use formats::FileRole;
+use jobs::{JobReport, sparse::MergeChunks};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use sparse::{Reconstruction, Session};
-use std::{sync::Arc, time::Instant};
+use std::sync::Arc;
 
 pub(crate) struct MergeHandler {
-    shared: Arc<Shared>,
-}
-
-impl MergeHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
+    pub shared: Arc<Shared>,
 }
 
 impl Handler for MergeHandler {
-    fn kind(&self) -> &'static str {
-        MERGE_CHUNKS
-    }
+    type Job = MergeChunks;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let started = Instant::now();
+    async fn run(&self, context: JobContext, payload: MergeChunks) -> Result<Outcome, JobError> {
         let resources = &self.shared.resources;
         let store = &resources.store;
-        objects::clean_up_earlier_attempts(store, &job).await;
-        let payload: MergeChunks = job.payload()?;
-        job.progress(0.0, "putting the parts together");
-        let (finished, chunks) = self.merge(&job, &payload).await?;
-        let mut results = self.export(&job, &finished).await?;
-        job.progress(0.9, "comparing with the ground truth");
-        results.extend(self.evaluate(&job, &payload, &finished).await?);
-        let merge = resources.job_report(&job, started, finished.merged.quality.len());
-        let report = RunReport::new(job.run_id().0, &payload, &finished, &chunks, &merge);
+        context.progress(0.0, "putting the parts together");
+        let (finished, chunks) = self.merge(&context, &payload).await?;
+        let mut results = self.export(&context, &finished).await?;
+        context.progress(0.9, "comparing with the ground truth");
+        results.extend(self.evaluate(&context, &payload, &finished).await?);
+        let merge = resources.job_report(&context, finished.merged.quality.len());
+        let report = RunReport::new(context.run_id().0, &payload, &finished, &chunks, &merge);
         let report = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
-        results.push(objects::write_result(store, &job, RUN, "application/json", report).await?);
+        results.push(objects::write_result(store, &context, RUN, "application/json", report).await?);
         Ok(results.into_iter().fold(Outcome::default(), Outcome::artefact))
     }
 }
@@ -53,12 +43,12 @@ impl MergeHandler {
     /// The whole motion, and who made its parts.
     async fn merge(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         payload: &MergeChunks,
     ) -> Result<(Arc<Finished>, Vec<JobReport>), JobError> {
         let Shared { resources, priors, .. } = &*self.shared;
         let (store, limit) = (&resources.store, resources.memory.max_object_bytes);
-        let artefacts = resources.artefacts_before(job).await?;
+        let artefacts = resources.artefacts_before(context).await?;
         let (mut parts, mut reports) = (Vec::new(), Vec::new());
         for artefact in &artefacts {
             let read = resources.read_artefact(artefact, limit);
@@ -69,7 +59,7 @@ impl MergeHandler {
                 }
                 _ => {}
             }
-            job.check()?;
+            context.check()?;
         }
         let session = objects::Input {
             name: "the session's artefact",
@@ -94,17 +84,22 @@ impl MergeHandler {
     }
 
     /// Writes the motion in every format.
-    async fn export(&self, job: &JobContext, finished: &Arc<Finished>) -> Result<Vec<Artefact>, JobError> {
+    async fn export(
+        &self,
+        context: &JobContext,
+        finished: &Arc<Finished>,
+    ) -> Result<Vec<Artefact>, JobError> {
         let mut results = Vec::new();
         for (done, export) in EXPORTS.iter().enumerate() {
-            job.check()?;
-            job.progress(0.3 + 0.6 * done as f64 / EXPORTS.len() as f64, format!("writing {}", export.name));
+            context.check()?;
+            context
+                .progress(0.3 + 0.6 * done as f64 / EXPORTS.len() as f64, format!("writing {}", export.name));
             let finished = finished.clone();
             let content = compute::run(move || (export.write)(&finished)).await;
             results.push(
                 objects::write_result(
                     &self.shared.resources.store,
-                    job,
+                    context,
                     export.name,
                     export.media_type,
                     content,
@@ -118,17 +113,17 @@ impl MergeHandler {
     /// The errors against the ground truth, if there is one.
     async fn evaluate(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         payload: &MergeChunks,
         finished: &Arc<Finished>,
     ) -> Result<Option<Artefact>, JobError> {
         let Shared { resources, priors, .. } = &*self.shared;
         let store = &resources.store;
         let files = &payload.request.files;
-        if !files.iter().any(|f| f.role == "ground-truth") {
+        if !files.iter().any(|f| f.role == FileRole::GroundTruth) {
             return Ok(None);
         }
-        let wanted: Vec<_> = files.iter().filter(|f| f.role != "control-points").cloned().collect();
+        let wanted: Vec<_> = files.iter().filter(|f| f.role != FileRole::ControlPoints).cloned().collect();
         let fetched = plan_job::fetch(store, &wanted, resources.memory.max_object_bytes).await?;
         let database = priors.database(&payload.request.motion_database).await?;
         let finished = finished.clone();
@@ -138,6 +133,6 @@ impl MergeHandler {
                 .await?;
         let Some(errors) = errors else { return Ok(None) };
         let json = serde_json::to_vec_pretty(&errors).map_err(JobError::retry)?;
-        Ok(Some(objects::write_result(store, job, evaluate::EVALUATION, "application/json", json).await?))
+        Ok(Some(objects::write_result(store, context, evaluate::EVALUATION, "application/json", json).await?))
     }
 }

@@ -1,27 +1,10 @@
 //! The skeleton of a performer of whom only the paths of some points were uploaded.
 
 use crate::error::InputError;
+use jobs::sparse::FittedReport;
 use motion_db::MotionDatabase;
-use serde::{Deserialize, Serialize};
 use skeleton_fit::{FitSettings, LIMBS, LimbScale, Sizes, fit_skeleton};
 use sparse::Session;
-
-/// What was fitted, for `run.json`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FittedReport {
-    /// lengths of the whole body, metres
-    pub sizes: Sizes,
-    /// scale of the arms against the database's mean skeleton
-    pub arms: LimbScale,
-    /// scale of the legs
-    pub legs: LimbScale,
-    /// scale of the trunk
-    pub trunk: LimbScale,
-    /// distinct skeletons of the database, of which the mean was taken
-    pub performers: usize,
-    /// spans of the session that decided
-    pub spans: usize,
-}
 
 /// The session on a skeleton fitted to its points, and what the user is told. Where nothing can be fitted it stays on the
 /// skeleton that it has.

@@ -1,57 +1,48 @@
 //! The job that reads a session's files and plans the rest of the run.
 
 use crate::{
-    MERGE_CHUNKS, PLAN_SPARSE, RECONSTRUCT_CHUNK, Shared,
+    Shared,
+    control::Markers,
     error::InputError,
     inputs::{self, Evidence, NamedBytes},
-    payload::{InputFile, JobReport, MergeChunks, Object, PlanSparse, ReconstructChunk},
-    performer::{self, FittedReport},
+    performer,
+};
+use jobs::{
+    InputFile, JobReport, Object,
+    sparse::{FittedReport, MergeChunks, PlanSparse, ReconstructChunk},
 };
 use model::Skeleton;
 use motion_db::MotionDatabase;
 use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use sparse::{Reconstructor, plan_chunks};
-use std::{sync::Arc, time::Instant};
+use std::sync::Arc;
 use store::Store;
 
-/// Attempts of a chunk: more than usual, as one may be lost with each worker that is taken away.
-const CHUNK_ATTEMPTS: i32 = 5;
 /// Weight of jobs in the run's progress: frames for a weight of 1.
 const FRAMES_PER_WEIGHT: f64 = 60.0;
 /// Frames that the merge gets through in the time of one reconstructed frame.
 const MERGE_SPEED: f64 = 20.0;
 
 pub(crate) struct PlanHandler {
-    shared: Arc<Shared>,
-}
-
-impl PlanHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
+    pub shared: Arc<Shared>,
 }
 
 impl Handler for PlanHandler {
-    fn kind(&self) -> &'static str {
-        PLAN_SPARSE
-    }
+    type Job = PlanSparse;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let started = Instant::now();
+    async fn run(&self, context: JobContext, request: PlanSparse) -> Result<Outcome, JobError> {
         let Shared { resources, priors, .. } = &*self.shared;
         let (store, memory) = (&resources.store, &resources.memory);
-        objects::clean_up_earlier_attempts(store, &job).await;
-        let request: PlanSparse = job.payload()?;
         request.parameters.check().map_err(InputError::from)?;
-        job.progress(0.1, "reading the session's files");
+        context.progress(0.1, "reading the session's files");
         let files = fetch(store, &request.files, memory.max_object_bytes).await?;
         let prior = priors.get(&request.motion_database, request.parameters.window).await?;
-        job.check()?;
+        context.check()?;
 
         let (limit, asked) = (memory.max_session_frames, request.clone());
         let (evidence, fitted, bytes) = compute::run(move || -> Result<_, InputError> {
-            let markers = asked.markers()?;
+            let markers = markers(&asked)?;
             let selection =
                 inputs::Selection { points: &asked.points, markers: &markers, reading: asked.reading() };
             let mut evidence = inputs::read(&files, &selection, prior.database.skeleton())?;
@@ -69,16 +60,24 @@ impl Handler for PlanHandler {
             Ok((evidence, fitted, bytes))
         })
         .await?;
-        job.check()?;
+        context.check()?;
         // Its chunks, which are nearly all of the work, are not counted before it is done.
-        job.progress(0.02, "planning");
-        let artefact = objects::write(store, &job, "session.bin", "application/octet-stream", bytes).await?;
-        let session = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
-        let report = resources.job_report(&job, started, evidence.session.num_frames());
+        context.progress(0.02, "planning");
+        let artefact =
+            objects::write(store, &context, "session.bin", "application/octet-stream", bytes).await?;
+        let session = Object::from(&artefact);
+        let report = resources.job_report(&context, evidence.session.num_frames());
         Ok(Outcome::default()
             .artefact(artefact)
             .children(children(request, session, evidence, fitted, report)?))
     }
+}
+
+/// What the names of the file of control points stand for.
+fn markers(request: &PlanSparse) -> Result<Markers, InputError> {
+    let [map, set, prefix] =
+        [&request.marker_map, &request.marker_set, &request.marker_prefix].map(Option::as_deref);
+    Markers::new(&request.mapping, map, set, prefix)
 }
 
 /// Sees to a session that came without a skeleton: it is given one that fits, or keeps the database's.
@@ -114,7 +113,7 @@ pub(crate) async fn fetch(
     for file in files {
         let input = objects::Input { name: &file.name, store_key: &file.store_key, blake3: &file.blake3 };
         let bytes = objects::read(store, input, max_bytes).await?;
-        let file = NamedBytes { name: file.name.clone(), role: file.role.clone(), bytes };
+        let file = NamedBytes { name: file.name.clone(), role: file.role, bytes };
         found.push(compute::run(move || file.unpacked(max_bytes)).await?);
     }
     Ok(found)
@@ -133,7 +132,7 @@ fn children(
     let num_chunks = chunks.len();
     let mut jobs = Vec::with_capacity(num_chunks + 1);
     for chunk in chunks {
-        let payload = ReconstructChunk {
+        let job = ReconstructChunk {
             session: session.clone(),
             motion_database: request.motion_database.clone(),
             parameters: request.parameters.clone(),
@@ -142,14 +141,11 @@ fn children(
             start: chunk.frames.start,
             end: chunk.frames.end,
         };
-        let payload = serde_json::to_value(payload).map_err(JobError::retry)?;
-        let weight = chunk.frames.len() as f64 / FRAMES_PER_WEIGHT;
-        jobs.push(ChildJob::new(RECONSTRUCT_CHUNK, payload).weight(weight).max_attempts(CHUNK_ATTEMPTS));
+        jobs.push(ChildJob::new(&job)?.weight(chunk.frames.len() as f64 / FRAMES_PER_WEIGHT));
     }
     let points = evidence.session.points.iter().map(|p| p.name.clone()).collect();
     let merge = MergeChunks { request, session, points, warnings: evidence.warnings, fitted, plan };
-    let merge = serde_json::to_value(merge).map_err(JobError::retry)?;
     let weight = num_frames as f64 / FRAMES_PER_WEIGHT / MERGE_SPEED;
-    jobs.push(ChildJob::new(MERGE_CHUNKS, merge).weight(weight).depends_on(0..num_chunks));
+    jobs.push(ChildJob::new(&merge)?.weight(weight).depends_on(0..num_chunks));
     Ok(jobs)
 }

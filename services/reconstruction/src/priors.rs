@@ -1,6 +1,6 @@
 //! Motion databases as priors, kept in memory up to a bound and shared by jobs and calls.
 
-use crate::payload::{MotionDatabaseFile, Object};
+use jobs::{Object, motion_database::MotionDatabaseFile};
 use library::{
     AllCores, Cache,
     motion_database::{self, Opened},

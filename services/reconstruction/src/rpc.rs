@@ -1,6 +1,7 @@
 //! `marey.v1.Reconstruction`: poses at once.
 
-use crate::{Shared, error::CallError, ik, payload::MotionDatabaseFile, priors::Prior};
+use crate::{Shared, error::CallError, ik, priors::Prior};
+use jobs::motion_database::MotionDatabaseFile;
 use kinematics::{Kinematics, Parametrisation, control_points};
 use model::{PointTrajectories, Skeleton};
 use proto::v1::{self, reconstruction_server::Reconstruction, solve_inverse_kinematics_request::Performer};

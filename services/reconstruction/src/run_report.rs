@@ -1,8 +1,12 @@
 //! `run.json`: all that decided the result, and what it took.
 
 use crate::feet::{Finished, FootReport};
-use crate::payload::{JobReport, MergeChunks, MotionDatabaseFile};
-use crate::performer::FittedReport;
+use formats::FileRole;
+use jobs::{
+    InputFile, JobReport,
+    motion_database::MotionDatabaseFile,
+    sparse::{FittedReport, MergeChunks},
+};
 use serde::Serialize;
 use sparse::{FrameQuality, Parameters};
 use std::collections::BTreeMap;
@@ -51,7 +55,7 @@ struct SessionReport<'a> {
 #[derive(Serialize)]
 struct FileReport<'a> {
     name: &'a str,
-    role: &'a str,
+    role: FileRole,
     bytes: u64,
     blake3: &'a str,
 }
@@ -83,12 +87,8 @@ impl<'a> RunReport<'a> {
         merge: &'a JobReport,
     ) -> Self {
         let request = &job.request;
-        let file = |f: &'a crate::InputFile| FileReport {
-            name: &f.name,
-            role: &f.role,
-            bytes: f.bytes,
-            blake3: &f.blake3,
-        };
+        let file =
+            |f: &'a InputFile| FileReport { name: &f.name, role: f.role, bytes: f.bytes, blake3: &f.blake3 };
         let seconds: f64 = chunks.iter().map(|c| c.seconds).sum();
         let frames: usize = chunks.iter().map(|c| c.frames).sum();
         Self {

@@ -1,8 +1,9 @@
 //! The service as a whole: a real PostgreSQL, a real folder, runs through the queue, poses through gRPC.
 
+use formats::FileRole;
+use jobs::{InputFile, motion_database::MotionDatabaseFile, sparse::PlanSparse};
 use proto::v1::{self, reconstruction_client::ReconstructionClient};
 use queue::{Artefact, RunId, RunState};
-use reconstruction::{InputFile, MotionDatabaseFile, PLAN_SPARSE, PlanSparse};
 use serde_json::Value;
 use sparse::Parameters;
 use std::{collections::BTreeMap, time::Duration};
@@ -46,12 +47,12 @@ impl Fixture {
         self.sandbox.serve(reconstruction::start, |config| config.worker.concurrency = jobs).await
     }
 
-    async fn upload(&self, name: &str, role: &str, content: impl Into<Vec<u8>>) -> InputFile {
+    async fn upload(&self, name: &str, role: FileRole, content: impl Into<Vec<u8>>) -> InputFile {
         let key = key::file(self.sandbox.project, self.session, Uuid::now_v7());
         let stored = self.sandbox.put(&key, content).await;
         InputFile {
             name: name.to_owned(),
-            role: role.to_owned(),
+            role,
             store_key: stored.key.into(),
             bytes: stored.bytes,
             blake3: stored.blake3,
@@ -61,9 +62,9 @@ impl Fixture {
     /// Skeleton, control points and truth of trial 7, which is not in the database.
     async fn walk_files(&self) -> Vec<InputFile> {
         vec![
-            self.upload("7.asf", "skeleton", walker::ASF).await,
-            self.upload("points.csv", "control-points", points_csv(7, FRAMES)).await,
-            self.upload("7_07.amc", "ground-truth", walker::amc(7, FRAMES)).await,
+            self.upload("7.asf", FileRole::Skeleton, walker::ASF).await,
+            self.upload("points.csv", FileRole::ControlPoints, points_csv(7, FRAMES)).await,
+            self.upload("7_07.amc", FileRole::GroundTruth, walker::amc(7, FRAMES)).await,
         ]
     }
 
@@ -92,8 +93,7 @@ impl Fixture {
     }
 
     async fn enqueue(&self, request: &PlanSparse) -> RunId {
-        let payload = serde_json::to_value(request).unwrap();
-        self.sandbox.enqueue("reconstruction", Some(self.session), PLAN_SPARSE, payload).await
+        self.sandbox.enqueue("reconstruction", Some(self.session), request).await
     }
 
     async fn succeeded(&self, run: RunId) -> BTreeMap<String, Artefact> {
@@ -212,7 +212,7 @@ async fn a_marker_file_is_read_through_the_mapping() {
     let fixture = Fixture::new().await;
     let service = fixture.serve(1).await;
     let csv = points_csv(7, 240).replace("left_wrist", "LWRA").replace("right_ankle", "RANK");
-    let files = vec![fixture.upload("markers.csv", "control-points", csv).await];
+    let files = vec![fixture.upload("markers.csv", FileRole::ControlPoints, csv).await];
     let mut request = fixture.request(files);
     let pairs = [("LWRA", "left_wrist"), ("RANK", "right_ankle"), ("head", "head")];
     request.mapping = pairs.map(|(from, to)| (from.to_owned(), to.to_owned())).into();
@@ -232,16 +232,16 @@ async fn a_marker_file_is_read_through_the_mapping() {
 async fn bad_input_fails_the_run_with_a_message_that_names_the_place() {
     let fixture = Fixture::new().await;
     let service = fixture.serve(1).await;
-    let asf = fixture.upload("7.asf", "skeleton", walker::ASF).await;
-    let good = fixture.upload("points.csv", "control-points", points_csv(7, 60)).await;
+    let asf = fixture.upload("7.asf", FileRole::Skeleton, walker::ASF).await;
+    let good = fixture.upload("points.csv", FileRole::ControlPoints, points_csv(7, 60)).await;
     let torn = points_csv(7, 60).replacen("\n0.0", "\n0.0,oops,", 1);
-    let torn = fixture.upload("torn.csv", "control-points", torn).await;
-    let other = fixture.upload("notes.txt", "control-points", "hello").await;
+    let torn = fixture.upload("torn.csv", FileRole::ControlPoints, torn).await;
+    let other = fixture.upload("notes.txt", FileRole::ControlPoints, "hello").await;
     let gone = InputFile {
         store_key: key::file(fixture.sandbox.project, fixture.session, Uuid::nil()).into(),
         ..good.clone()
     };
-    let cut_asf = fixture.upload("cut.asf", "skeleton", &walker::ASF.as_bytes()[..900]).await;
+    let cut_asf = fixture.upload("cut.asf", FileRole::Skeleton, &walker::ASF.as_bytes()[..900]).await;
     let cases = [
         (vec![asf.clone()], vec![], "session has 0 files of role control-points"),
         (vec![good.clone(), good.clone()], vec![], "session has 2 files of role control-points"),

@@ -3,7 +3,7 @@
 //! [`start`] runs the gRPC server (`marey.v1.Refinement`, health, reflection) and claims two kinds of job:
 //!
 //! ```text
-//! initialise-body (shape-init) ──► track-chunk × n ──► merge-tracks ──► draw-overlay × cameras (shape-init)
+//! fit-shape (shape-init) ──► track-chunk × n ──► merge-tracks ──► draw-overlay × cameras (shape-init)
 //! ```
 //!
 //! Each chunk begins with a key frame that is found without a start, so that any number of workers share one session. How a
@@ -53,10 +53,10 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
     let shared = Arc::new(Shared { models: Models::new(resources.clone()), resources });
     let rpc = RefinementServer::new(rpc::Rpc::new(shared.clone()))
         .max_decoding_message_size(rpc::MAX_REQUEST_BYTES);
-    let builder = config.worker.builder(NAME, &pool).map(|builder| {
+    let builder = shared.resources.worker(&config.worker).map(|builder| {
         builder
-            .handler(track_job::TrackHandler::new(shared.clone()))
-            .handler(merge_job::MergeHandler::new(shared))
+            .handler(track_job::TrackHandler { shared: shared.clone() })
+            .handler(merge_job::MergeHandler { shared })
     });
     let parts = Parts {
         name: NAME,

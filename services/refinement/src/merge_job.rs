@@ -1,9 +1,14 @@
 //! The job that puts the chunks together and writes the results.
 
-use std::{sync::Arc, time::Instant};
+use std::sync::Arc;
 
-use camera_jobs::{MERGE_TRACKS, MergeTracks, TRACKED, TrackingSession, named};
-use jobs::{JobReport, MultiViewReport, TrackingParts};
+use camera_jobs::tracking_session;
+use jobs::{
+    JobReport,
+    multi_view::{MergeTracks, TRACKED, TrackingSession},
+    named,
+    run_json::{MultiViewReport, TrackingParts},
+};
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
 use tracking::{Chunk, Stage, hold_unseen, merge};
@@ -21,48 +26,37 @@ const MAX_CHUNK_BYTES: u64 = 256 << 20;
 const RUN: &str = "run.json";
 
 pub(crate) struct MergeHandler {
-    shared: Arc<Shared>,
-}
-
-impl MergeHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
+    pub shared: Arc<Shared>,
 }
 
 impl Handler for MergeHandler {
-    fn kind(&self) -> &'static str {
-        MERGE_TRACKS
-    }
+    type Job = MergeTracks;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let started = Instant::now();
+    async fn run(&self, context: JobContext, payload: MergeTracks) -> Result<Outcome, JobError> {
         let resources = &self.shared.resources;
         let store = &resources.store;
-        objects::clean_up_earlier_attempts(store, &job).await;
-        let payload: MergeTracks = job.payload()?;
-        job.progress(0.0, "putting the parts together");
-        let session = Arc::new(TrackingSession::read(resources, &payload.session).await?);
-        let (finished, chunks) = self.merge(&job, &session).await?;
+        context.progress(0.0, "putting the parts together");
+        let session = Arc::new(tracking_session(resources, &payload.session).await?);
+        let (finished, chunks) = self.merge(&context, &session).await?;
         let finished = Arc::new(finished);
-        let of = finished.clone();
-        let tracked = compute::run(move || of.tracked.to_bytes()).await.map_err(InputError::from)?;
+        let packed = finished.clone();
+        let tracked = compute::run(move || packed.tracked.to_bytes()).await.map_err(InputError::from)?;
         let mut written =
-            vec![objects::write(store, &job, TRACKED, "application/octet-stream", tracked).await?];
-        written.extend(self.export(&job, &finished).await?);
-        let merge = resources.job_report(&job, started, finished.tracked.frames.len());
+            vec![objects::write(store, &context, TRACKED, "application/octet-stream", tracked).await?];
+        written.extend(self.export(&context, &finished).await?);
+        let merge = resources.job_report(&context, finished.tracked.frames.len());
         let warnings = [&session.warnings[..], &report::doubts(&finished)].concat();
         let parts = TrackingParts { found: report::found(&finished), chunks: &chunks, merge: &merge };
         let report = MultiViewReport::new(
-            job.run_id().0,
+            context.run_id().0,
             &session.request,
-            (&session.plan, &session.initialise),
+            (&session.plan, &session.fit_shape),
             &session.cameras,
             &warnings,
             Some(parts),
         );
         let report = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
-        written.push(objects::write_result(store, &job, RUN, "application/json", report).await?);
+        written.push(objects::write_result(store, &context, RUN, "application/json", report).await?);
         Ok(written.into_iter().fold(Outcome::default(), Outcome::artefact))
     }
 }
@@ -71,19 +65,19 @@ impl MergeHandler {
     /// The whole session, and who tracked its parts.
     async fn merge(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         session: &Arc<TrackingSession>,
     ) -> Result<(Finished, Vec<JobReport>), JobError> {
         let Shared { resources, models } = &*self.shared;
-        let artefacts = resources.artefacts_before(job).await?;
+        let artefacts = resources.artefacts_before(context).await?;
         let (mut chunks, mut reports) = (Vec::new(), Vec::new());
         for index in 0.. {
-            let Some(artefact) = named(&artefacts, &chunk_name(index)) else { break };
-            job.check()?;
+            let name = chunk_name(index);
+            let Some(artefact) = artefacts.iter().find(|artefact| artefact.name == name) else { break };
+            context.check()?;
             let bytes = resources.read_artefact(artefact, MAX_CHUNK_BYTES).await?;
             chunks.push(Chunk::from_bytes(&bytes).map_err(JobError::retry)?);
-            let report = named(&artefacts, &report_name(index))
-                .ok_or_else(|| JobError::retry(format!("{} is missing", report_name(index))))?;
+            let report = named(&artefacts, &report_name(index))?;
             let bytes = resources.read_artefact(report, MAX_CHUNK_BYTES).await?;
             reports.push(serde_json::from_slice(&bytes).map_err(JobError::retry)?);
         }
@@ -99,7 +93,7 @@ impl MergeHandler {
             let meetings = meetings.collect();
             drop(chunks);
             hold_unseen(&model, &shape, &mut merged.frames);
-            let cameras = session.clips.iter().map(|of| of.camera.name.clone()).collect();
+            let cameras = session.clips.iter().map(|clips| clips.camera.name.clone()).collect();
             let frame_rate = session.frame_rate;
             Ok(Finished {
                 model,
@@ -114,15 +108,23 @@ impl MergeHandler {
     }
 
     /// Writes the motion in every format, one after the other.
-    async fn export(&self, job: &JobContext, finished: &Arc<Finished>) -> Result<Vec<Artefact>, JobError> {
+    async fn export(
+        &self,
+        context: &JobContext,
+        finished: &Arc<Finished>,
+    ) -> Result<Vec<Artefact>, JobError> {
         let mut written = Vec::new();
         for (done, export) in EXPORTS.iter().enumerate() {
-            job.check()?;
-            job.progress(0.2 + 0.75 * done as f64 / EXPORTS.len() as f64, format!("writing {}", export.name));
+            context.check()?;
+            context.progress(
+                0.2 + 0.75 * done as f64 / EXPORTS.len() as f64,
+                format!("writing {}", export.name),
+            );
             let finished = finished.clone();
             let content = compute::run(move || (export.write)(&finished)).await?;
             let store = &self.shared.resources.store;
-            written.push(objects::write_result(store, job, export.name, export.media_type, content).await?);
+            written
+                .push(objects::write_result(store, context, export.name, export.media_type, content).await?);
         }
         Ok(written)
     }

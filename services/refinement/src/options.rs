@@ -4,7 +4,7 @@ use multi_view::Parameters;
 use tracking::{Options, ParticleOptions};
 
 /// How a person is found in a key frame.
-pub(crate) fn of_fit(parameters: &Parameters) -> shape_fit::Options {
+pub(crate) fn fit(parameters: &Parameters) -> shape_fit::Options {
     shape_fit::Options {
         least_iou: parameters.least_overlap,
         leave_out_bad_view: parameters.leave_out_bad_view,
@@ -13,7 +13,7 @@ pub(crate) fn of_fit(parameters: &Parameters) -> shape_fit::Options {
 }
 
 /// How a person is followed in a run.
-pub(crate) fn of_run(parameters: &Parameters) -> Options {
+pub(crate) fn run(parameters: &Parameters) -> Options {
     let particles = ParticleOptions {
         particles: parameters.particles,
         iterations: parameters.iterations,
@@ -22,7 +22,7 @@ pub(crate) fn of_run(parameters: &Parameters) -> Options {
         ..ParticleOptions::default()
     };
     Options {
-        fit: of_fit(parameters),
+        fit: fit(parameters),
         particles: (parameters.particles > 0).then_some(particles),
         ..Options::default()
     }

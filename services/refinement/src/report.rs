@@ -49,11 +49,11 @@ pub(crate) fn found(finished: &Finished) -> Value {
 
 /// Mean overlap of every camera, where it sees somebody.
 fn overlaps(finished: &Finished) -> Vec<Option<f64>> {
-    let of_camera = |camera: usize| {
+    let overlap = |camera: usize| {
         let frames = finished.tracked.frames.iter();
         mean(frames.filter_map(|tracked| tracked.ious.get(camera).copied().flatten()))
     };
-    (0..finished.cameras.len()).map(of_camera).collect()
+    (0..finished.cameras.len()).map(overlap).collect()
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {

@@ -62,36 +62,40 @@ pub(crate) const EXPORTS: [Export; 7] = [
     Export {
         name: "motion.bvh",
         media_type: TEXT,
-        write: |of| Ok(formats::bvh::write(&of.motion()?).into_bytes()),
+        write: |finished| Ok(formats::bvh::write(&finished.motion()?).into_bytes()),
     },
     Export {
         name: "body.glb",
         media_type: "model/gltf-binary",
-        write: |of| {
-            let poses = of.poses();
-            let poses = Poses { poses: &poses, frame_rate: of.frame_rate };
-            Ok(body::glb(&of.model, &of.shape, Some(poses))?)
+        write: |finished| {
+            let poses = finished.poses();
+            let poses = Poses { poses: &poses, frame_rate: finished.frame_rate };
+            Ok(body::glb(&finished.model, &finished.shape, Some(poses))?)
         },
     },
     Export {
         name: "joints.c3d",
         media_type: "application/octet-stream",
-        write: |of| Ok(formats::c3d::write(&of.joints()?)),
+        write: |finished| Ok(formats::c3d::write(&finished.joints()?)),
     },
     Export {
         name: "joints.trc",
         media_type: TEXT,
-        write: |of| Ok(formats::trc::write("joints.trc", &of.joints()?).into_bytes()),
+        write: |finished| Ok(formats::trc::write("joints.trc", &finished.joints()?).into_bytes()),
     },
     Export {
         name: "joints.csv",
         media_type: CSV,
-        write: |of| Ok(formats::points_csv::write(&of.joints()?).into_bytes()),
+        write: |finished| Ok(formats::points_csv::write(&finished.joints()?).into_bytes()),
     },
     Export {
         name: "poses.csv",
         media_type: CSV,
-        write: |of| Ok(formats::motion_csv::write(&of.motion()?).into_bytes()),
+        write: |finished| Ok(formats::motion_csv::write(&finished.motion()?).into_bytes()),
     },
-    Export { name: "quality.csv", media_type: CSV, write: |of| Ok(csv::quality(of).into_bytes()) },
+    Export {
+        name: "quality.csv",
+        media_type: CSV,
+        write: |finished| Ok(csv::quality(finished).into_bytes()),
+    },
 ];

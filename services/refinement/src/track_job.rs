@@ -1,12 +1,10 @@
 //! The job that follows a person through one chunk of a session.
 
-use std::{
-    sync::{Arc, atomic::AtomicBool},
-    time::Instant,
-};
+use std::sync::{Arc, atomic::AtomicBool};
 
 use body::BodyModel;
-use camera_jobs::{Silhouettes, TRACK_CHUNK, TrackChunk, TrackingSession, View};
+use camera_jobs::{Silhouettes, View, tracking_session};
+use jobs::multi_view::{TrackChunk, TrackingSession};
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::{
     compute::{self, StopOnDrop},
@@ -17,13 +15,7 @@ use tracking::{Chunk, Footage, Seen, Tracker, follow};
 use crate::{InputError, Shared, options};
 
 pub(crate) struct TrackHandler {
-    shared: Arc<Shared>,
-}
-
-impl TrackHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
+    pub shared: Arc<Shared>,
 }
 
 /// Name of the artefact with the frames of a chunk.
@@ -37,42 +29,37 @@ pub(crate) fn report_name(index: usize) -> String {
 }
 
 impl Handler for TrackHandler {
-    fn kind(&self) -> &'static str {
-        TRACK_CHUNK
-    }
+    type Job = TrackChunk;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let started = Instant::now();
+    async fn run(&self, context: JobContext, payload: TrackChunk) -> Result<Outcome, JobError> {
         let Shared { resources, models } = &*self.shared;
         let store = &resources.store;
-        objects::clean_up_earlier_attempts(store, &job).await;
-        let payload: TrackChunk = job.payload()?;
-        job.progress(0.0, format!("part {} of {}: reading", payload.chunk + 1, payload.num_chunks));
-        let session = TrackingSession::read(resources, &payload.session).await?;
+        context.progress(0.0, format!("part {} of {}: reading", payload.chunk + 1, payload.num_chunks));
+        let session = tracking_session(resources, &payload.session).await?;
         let frames = payload.start..payload.end;
         let silhouettes = Silhouettes::read(resources, &session.clips, frames.clone()).await?;
         let model = models.get(&session.request.body_model).await?;
         let stop = StopOnDrop::default();
-        let (of, flag, work) = (job.clone(), stop.flag(), payload.clone());
-        let tracked = compute::run(move || track(&model, &session, &silhouettes, &work, &of, &flag));
+        let (watched, flag, chunk) = (context.clone(), stop.flag(), payload.clone());
+        let tracked = compute::run(move || track(&model, &session, &silhouettes, &chunk, &watched, &flag));
         tokio::pin!(tracked);
         let chunk = tokio::select! {
             chunk = &mut tracked => chunk,
-            () = job.cancelled() => {
+            () = context.cancelled() => {
                 // it is looked at before every step inside a frame
                 stop.stop();
                 tracked.await
             }
         };
-        job.check()?;
+        context.check()?;
         let bytes = chunk?.to_bytes().map_err(InputError::from)?;
-        let report = resources.job_report(&job, started, frames.len());
+        let report = resources.job_report(&context, frames.len());
         let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
         let chunk =
-            objects::write(store, &job, &chunk_name(payload.chunk), "application/octet-stream", bytes)
+            objects::write(store, &context, &chunk_name(payload.chunk), "application/octet-stream", bytes)
                 .await?;
         let report =
-            objects::write(store, &job, &report_name(payload.chunk), "application/json", report).await?;
+            objects::write(store, &context, &report_name(payload.chunk), "application/json", report).await?;
         Ok(Outcome::default().artefact(chunk).artefact(report))
     }
 }
@@ -83,14 +70,14 @@ fn track(
     session: &TrackingSession,
     silhouettes: &Silhouettes,
     payload: &TrackChunk,
-    job: &JobContext,
+    context: &JobContext,
     stop: &AtomicBool,
 ) -> Result<Chunk, InputError> {
     let parameters = &session.request.parameters;
-    let fit_options = options::of_fit(parameters);
+    let fit_options = options::fit(parameters);
     // until the person is found
     let rest = vec![0.0; model.rig().num_dofs()];
-    let mut tracker = Tracker::new(model, &session.alpha, &rest, options::of_run(parameters))?;
+    let mut tracker = Tracker::new(model, &session.alpha, &rest, options::run(parameters))?;
     let num_frames = payload.end - payload.start;
     let footage = Footage {
         frames: payload.start..payload.end,
@@ -106,6 +93,6 @@ fn track(
     follow(&mut tracker, footage, stop, |done| {
         let part = format!("part {} of {}", payload.chunk + 1, payload.num_chunks);
         let phrase = format!("{part}: frame {done} of {num_frames}");
-        job.progress(done as f64 / num_frames.max(1) as f64, phrase);
+        context.progress(done as f64 / num_frames.max(1) as f64, phrase);
     })
 }

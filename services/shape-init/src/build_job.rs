@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use body::{LearnOptions, Learned, ScanOptions, ScanSet};
 use formats::archive::{self, Entry, Limits};
-use jobs::{BUILD_BODY_MODEL, BodyModelName, BuildBodyModel, InputFile};
+use jobs::{
+    InputFile,
+    body_model::{BodyModelName, BuildBodyModel},
+};
 use queue::{Handler, JobContext, JobError, Outcome};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -20,13 +23,7 @@ const MODEL: &str = "model.marey-body";
 const SUMMARY: &str = "summary.json";
 
 pub(crate) struct BuildHandler {
-    shared: Arc<Shared>,
-}
-
-impl BuildHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
+    pub shared: Arc<Shared>,
 }
 
 /// What a model was learned from, and how well. Shown with it.
@@ -46,22 +43,18 @@ struct Contents {
 }
 
 impl Handler for BuildHandler {
-    fn kind(&self) -> &'static str {
-        BUILD_BODY_MODEL
-    }
+    type Job = BuildBodyModel;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let request: BuildBodyModel = job.payload()?;
+    async fn run(&self, context: JobContext, request: BuildBodyModel) -> Result<Outcome, JobError> {
         let (store, id) = (&self.shared.resources.store, request.body_model.id);
-        objects::clean_up_earlier_attempts(store, &job).await;
-        let own = key::body_model_job_prefix(id, job.id().0);
-        objects::clean_up_earlier_attempts_under(store, &job, &own).await;
-        let entries = self.unpack(&job, &request.files).await?;
-        job.progress(0.3, "reading the scans");
+        let own = key::body_model_job_prefix(id, context.id().0);
+        objects::clean_up_earlier_attempts_under(store, &context, &own).await;
+        let entries = self.unpack(&context, &request.files).await?;
+        context.progress(0.3, "reading the scans");
         let options = ScanOptions { metres_per_unit: request.metres_per_unit };
         let set = compute::run(move || ScanSet::read(entries, &options)).await.map_err(InputError::from)?;
-        job.check()?;
-        job.progress(0.4, format!("learning from {} scans", set.num_scans()));
+        context.check()?;
+        context.progress(0.4, format!("learning from {} scans", set.num_scans()));
         let learning = LearnOptions {
             components: request.components,
             description: format!(
@@ -78,14 +71,15 @@ impl Handler for BuildHandler {
         })
         .await
         .map_err(InputError::from)?;
-        job.check()?;
-        job.progress(0.95, "storing the model");
+        context.check()?;
+        context.progress(0.95, "storing the model");
         let contents = contents(&set, &learned, &request.files);
         let bytes = learned.model.to_bytes();
-        let key = key::body_model(id, job.id().0, job.lease_number().0, MODEL).map_err(JobError::retry)?;
+        let key =
+            key::body_model(id, context.id().0, context.lease_number().0, MODEL).map_err(JobError::retry)?;
         let stored = store.put(&key, bytes.into()).await.map_err(JobError::retry)?;
         let summary = serde_json::to_vec_pretty(&contents).map_err(JobError::retry)?;
-        let summary = objects::write_result(store, &job, SUMMARY, "application/json", summary).await?;
+        let summary = objects::write_result(store, &context, SUMMARY, "application/json", summary).await?;
         let ready = Ready {
             name: request.body_model,
             stored,
@@ -102,14 +96,14 @@ impl Handler for BuildHandler {
 
 impl BuildHandler {
     /// All files that models are learned from, out of all uploads.
-    async fn unpack(&self, job: &JobContext, files: &[InputFile]) -> Result<Vec<Entry>, JobError> {
+    async fn unpack(&self, context: &JobContext, files: &[InputFile]) -> Result<Vec<Entry>, JobError> {
         let resources = &self.shared.resources;
         let memory = &resources.memory;
         let mut left = memory.max_build_bytes;
         let mut entries = Vec::new();
         for (done, file) in files.iter().enumerate() {
-            job.check()?;
-            job.progress(0.3 * done as f64 / files.len() as f64, format!("unpacking {}", file.name));
+            context.check()?;
+            context.progress(0.3 * done as f64 / files.len() as f64, format!("unpacking {}", file.name));
             let bytes = resources.read_file(file, memory.max_object_bytes).await?;
             let (name, total_bytes) = (file.name.clone(), left);
             let unpacked = compute::run(move || -> Result<Vec<Entry>, InputError> {

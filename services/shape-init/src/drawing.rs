@@ -27,7 +27,7 @@ pub(crate) struct Drawer {
 
 impl Drawer {
     pub fn new(model: &BodyModel, camera: &Camera) -> Self {
-        let of_limb = |limb: Limb| {
+        let topology = |limb: Limb| {
             let is_own = |face: &&[u32; 3]| face.iter().any(|&corner| model.limbs()[corner as usize] == limb);
             let faces: Vec<[u32; 3]> = model.faces().iter().filter(is_own).copied().collect();
             Topology::new(&faces, model.num_vertices())
@@ -36,7 +36,7 @@ impl Drawer {
         Self {
             view: View::new(camera),
             whole: Topology::new(model.faces(), model.num_vertices()),
-            limbs: Limb::ALL.map(of_limb).into(),
+            limbs: Limb::ALL.map(topology).into(),
             rasteriser: Rasteriser::new(),
             drawn: Silhouette::empty(size[0], size[1]),
         }

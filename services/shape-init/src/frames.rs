@@ -46,8 +46,8 @@ impl Frames {
         match self {
             Self::Video { path, largest_side, .. } => {
                 let options = ReadOptions::default();
-                let probe =
-                    video::probe(path, &options.programs, &options.limits).map_err(|e| self.of_video(&e))?;
+                let probe = video::probe(path, &options.programs, &options.limits)
+                    .map_err(|e| self.video_error(&e))?;
                 let count = probe.num_frames.and_then(|count| usize::try_from(count).ok());
                 Ok(Announced { size: scaled(probe.size, *largest_side), count, rate: Some(probe.rate) })
             }
@@ -75,17 +75,17 @@ impl Frames {
                     ..ReadOptions::default()
                 };
                 let source = video::Source::video(path);
-                let reader = FrameReader::open(&source, &options).map_err(|e| self.of_video(&e))?;
+                let reader = FrameReader::open(&source, &options).map_err(|e| self.video_error(&e))?;
                 Ok(Stream::Video { reader: Box::new(reader), name, folder: path.parent() })
             }
             Self::Pictures { entries, name } => Ok(Stream::Pictures { entries: entries.iter(), name }),
         }
     }
 
-    fn of_video(&self, error: &video::Error) -> InputError {
+    fn video_error(&self, error: &video::Error) -> InputError {
         match self {
-            Self::Video { path, name, .. } => of_video(name, path.parent(), error),
-            Self::Pictures { name, .. } => of_video(name, None, error),
+            Self::Video { path, name, .. } => video_error(name, path.parent(), error),
+            Self::Pictures { name, .. } => video_error(name, None, error),
         }
     }
 }
@@ -102,7 +102,7 @@ impl Stream<'_> {
                 if (frame.width(), frame.height()) != (width, height) {
                     *frame = reader.frame();
                 }
-                reader.read(frame).map_err(|e| of_video(name, *folder, &e))
+                reader.read(frame).map_err(|e| video_error(name, *folder, &e))
             }
             Self::Pictures { entries, name } => {
                 let Some(entry) = entries.next() else { return Ok(false) };
@@ -137,7 +137,7 @@ impl Stream<'_> {
 }
 
 /// A message for the user, who knows nothing of our folders.
-fn of_video(name: &str, folder: Option<&Path>, error: &video::Error) -> InputError {
+fn video_error(name: &str, folder: Option<&Path>, error: &video::Error) -> InputError {
     let mut message = error.to_string();
     if let Some(folder) = folder {
         message = message.replace(&format!("{}/", folder.display()), "");

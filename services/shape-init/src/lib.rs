@@ -3,11 +3,11 @@
 //! [`start`] runs the gRPC server (`marey.v1.ShapeInit`, health, reflection) and claims five kinds of job:
 //!
 //! ```text
-//! build-body-model     plan-multi-view ──► make-silhouettes × cameras ──► initialise-body ──► (refinement) ──► draw-overlay × cameras
+//! build-body-model     plan-multi-view ──► make-silhouettes × cameras ──► fit-shape ──► (refinement) ──► draw-overlay × cameras
 //! ```
 //!
 //! The plan reads the calibration and finds out whose file is whose. One job a camera streams its frames and leaves packed
-//! silhouettes, ten seconds an artefact, with what was found of their quality. `initialise-body` fits a body to the first
+//! silhouettes, ten seconds an artefact, with what was found of their quality. `fit-shape` fits a body to the first
 //! frames and enqueues the jobs that follow the person through all of them, which the refinement service takes; what they
 //! found is drawn over what each camera saw.
 
@@ -18,16 +18,15 @@ mod error;
 mod fit;
 mod frames;
 mod hull;
-mod initialise_job;
 mod members;
 mod opened;
 mod overlay_job;
-mod payload;
 mod plan_job;
 mod results;
 mod rpc;
 mod scratch;
 mod segment;
+mod shape_job;
 mod shape_report;
 mod silhouettes_job;
 mod sources;
@@ -41,11 +40,6 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
-
-/// Makes the silhouettes of one camera.
-pub const MAKE_SILHOUETTES: &str = "make-silhouettes";
-/// Finds pose and shape in the first frames.
-pub const INITIALISE_BODY: &str = "initialise-body";
 
 /// Name of the service in logs and in the queue.
 pub const NAME: &str = "shape-init";
@@ -70,13 +64,13 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
     let shared = Arc::new(Shared { models: Models::new(resources.clone()), resources });
     let rpc =
         ShapeInitServer::new(rpc::Rpc::new(shared.clone())).max_decoding_message_size(rpc::MAX_REQUEST_BYTES);
-    let builder = config.worker.builder(NAME, &pool).map(|builder| {
+    let builder = shared.resources.worker(&config.worker).map(|builder| {
         builder
-            .handler(build_job::BuildHandler::new(shared.clone()))
-            .handler(plan_job::PlanHandler::new(shared.clone()))
-            .handler(silhouettes_job::SilhouettesHandler::new(shared.clone()))
-            .handler(initialise_job::InitialiseHandler::new(shared.clone()))
-            .handler(overlay_job::OverlayHandler::new(shared))
+            .handler(build_job::BuildHandler { shared: shared.clone() })
+            .handler(plan_job::PlanHandler { shared: shared.clone() })
+            .handler(silhouettes_job::SilhouettesHandler { shared: shared.clone() })
+            .handler(shape_job::ShapeHandler { shared: shared.clone() })
+            .handler(overlay_job::OverlayHandler { shared })
     });
     let parts = Parts {
         name: NAME,

@@ -5,7 +5,7 @@ use std::{cmp::Ordering, collections::BTreeSet};
 use bytes::Bytes;
 use formats::archive::{self, Entry, Limits};
 
-use jobs::Members;
+use jobs::multi_view::Members;
 use service::FileError;
 
 /// Whether a member is a picture; what systems hide in archives isn't.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use formats::archive::Entry;
-use jobs::{Source, SourceKind};
+use jobs::multi_view::{Source, SourceKind};
 use queue::JobError;
 use service::{Resources, compute};
 

@@ -6,8 +6,12 @@ use std::{
 };
 
 use body::{BodyModel, Posed};
-use camera_jobs::{DRAW_OVERLAY, DrawOverlay, Silhouettes, TRACKED, TrackingSession, named};
-use jobs::{SourceKind, file_part};
+use camera_jobs::{Silhouettes, tracking_session};
+use jobs::{
+    file_part,
+    multi_view::{DrawOverlay, SourceKind, TRACKED},
+    named,
+};
 use model::{Camera, Image};
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::{
@@ -30,13 +34,7 @@ use crate::{
 const MAX_TRACKED_BYTES: u64 = 1 << 30;
 
 pub(crate) struct OverlayHandler {
-    shared: Arc<Shared>,
-}
-
-impl OverlayHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
+    pub shared: Arc<Shared>,
 }
 
 /// What bodies are drawn on.
@@ -58,42 +56,37 @@ struct Scene {
 }
 
 impl Handler for OverlayHandler {
-    fn kind(&self) -> &'static str {
-        DRAW_OVERLAY
-    }
+    type Job = DrawOverlay;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
+    async fn run(&self, context: JobContext, payload: DrawOverlay) -> Result<Outcome, JobError> {
         let Shared { resources, models } = &*self.shared;
         let store = &resources.store;
-        objects::clean_up_earlier_attempts(store, &job).await;
-        let payload: DrawOverlay = job.payload()?;
-        let session = TrackingSession::read(resources, &payload.session).await?;
-        let (Some(of), Some(clips)) =
+        let session = tracking_session(resources, &payload.session).await?;
+        let (Some(camera), Some(clips)) =
             (session.cameras.get(payload.camera), session.clips.get(payload.camera))
         else {
             return Err(JobError::retry(format!("no camera {}", payload.camera)));
         };
-        let name = of.camera.name.clone();
-        job.progress(0.0, format!("camera {name}: reading"));
-        let artefacts = resources.artefacts_before(&job).await?;
-        let tracked = named(&artefacts, TRACKED).ok_or_else(|| JobError::retry("no tracked frames"))?;
-        let tracked = resources.read_artefact(tracked, MAX_TRACKED_BYTES).await?;
+        let name = camera.camera.name.clone();
+        context.progress(0.0, format!("camera {name}: reading"));
+        let artefacts = resources.artefacts_before(&context).await?;
+        let tracked = resources.read_artefact(named(&artefacts, TRACKED)?, MAX_TRACKED_BYTES).await?;
         let tracked = compute::run(move || Chunk::from_bytes(&tracked)).await.map_err(JobError::retry)?;
         let scratch = TempDir::new().map_err(JobError::retry)?;
         let frames = session.first_frame..session.end_frame;
         let largest_side = session.request.parameters.largest_side;
-        let ground = match of.source.kind {
+        let ground = match camera.source.kind {
             SourceKind::Masks => {
                 Ground::Masks(Silhouettes::read(resources, std::slice::from_ref(clips), frames).await?)
             }
-            _ => match open(resources, &of.source, largest_side, scratch.path()).await? {
+            _ => match open(resources, &camera.source, largest_side, scratch.path()).await? {
                 Opened::Frames(frames) => Ground::Frames(frames),
                 Opened::Masks(_) => return Err(JobError::retry(format!("{name} has masks"))),
             },
         };
-        job.check()?;
+        context.check()?;
         let scene = Scene {
-            camera: of.camera.camera().map_err(JobError::retry)?,
+            camera: camera.camera.camera().map_err(JobError::retry)?,
             ground,
             model: models.get(&session.request.body_model).await?,
             alpha: session.alpha,
@@ -103,18 +96,19 @@ impl Handler for OverlayHandler {
         let stem = format!("overlay_{}", file_part(&name, payload.camera));
         let path = scratch.path().join(format!("{stem}.mp4"));
         let stop = StopOnDrop::default();
-        let (of, to, flag) = (job.clone(), path.clone(), stop.flag());
-        let drawn = compute::run(move || draw(&scene, &to, &of, &flag)).await;
-        job.check()?;
+        let (watched, to, flag) = (context.clone(), path.clone(), stop.flag());
+        let drawn = compute::run(move || draw(&scene, &to, &watched, &flag)).await;
+        context.check()?;
         let file = match drawn {
             Ok(()) => {
-                objects::write_result_file(store, &job, &format!("{stem}.mp4"), "video/mp4", &path).await?
+                objects::write_result_file(store, &context, &format!("{stem}.mp4"), "video/mp4", &path)
+                    .await?
             }
             // The motion is there all the same.
             Err(DrawError::NoEncoder(error)) => {
                 let text = format!("no overlay video of camera {name}: {error}\n");
                 let name = format!("{stem}.txt");
-                objects::write_result(store, &job, &name, "text/plain; charset=utf-8", text).await?
+                objects::write_result(store, &context, &name, "text/plain; charset=utf-8", text).await?
             }
             Err(DrawError::Input(error)) => return Err(error.into()),
             Err(DrawError::Video(error)) => return Err(JobError::retry(error)),
@@ -149,7 +143,7 @@ impl From<InputError> for DrawError {
 }
 
 /// Draws frame after frame; one is in memory at a time.
-fn draw(scene: &Scene, path: &Path, job: &JobContext, stop: &Arc<AtomicBool>) -> Result<(), DrawError> {
+fn draw(scene: &Scene, path: &Path, context: &JobContext, stop: &Arc<AtomicBool>) -> Result<(), DrawError> {
     let Scene { camera, model, tracked, .. } = scene;
     let shape = model.shape(&scene.alpha);
     let mut drawer = Drawer::new(model, camera);
@@ -160,7 +154,7 @@ fn draw(scene: &Scene, path: &Path, job: &JobContext, stop: &Arc<AtomicBool>) ->
     let mut picture = Image::black(0, 0);
     let count = tracked.frames.len();
     for (done, frame) in tracked.frames.iter().enumerate() {
-        if job.is_cancelled() || stop.load(std::sync::atomic::Ordering::Relaxed) {
+        if context.is_cancelled() || stop.load(std::sync::atomic::Ordering::Relaxed) {
             return Err(DrawError::Stopped);
         }
         if !pictures.next(frame.frame, &mut picture)? {
@@ -170,7 +164,7 @@ fn draw(scene: &Scene, path: &Path, job: &JobContext, stop: &Arc<AtomicBool>) ->
         drawer.tracked(&mut picture, &posed.vertices, frame);
         writer.write(&picture)?;
         let phrase = format!("drawing camera {}: frame {} of {count}", camera.name, done + 1);
-        job.progress(0.99 * done as f64 / count as f64, phrase);
+        context.progress(0.99 * done as f64 / count as f64, phrase);
     }
     Ok(writer.finish()?)
 }
@@ -186,8 +180,8 @@ impl<'a> Pictures<'a> {
     fn open(ground: &'a Ground, frames: &[Tracked], stop: &Arc<AtomicBool>) -> Result<Self, InputError> {
         Ok(match ground {
             Ground::Masks(silhouettes) => Self::Masks(silhouettes),
-            Ground::Frames(of) => {
-                let mut stream = of.open(1, stop)?;
+            Ground::Frames(frames_of_camera) => {
+                let mut stream = frames_of_camera.open(1, stop)?;
                 stream.skip(frames.first().map_or(0, |first| first.frame))?;
                 Self::Frames(stream)
             }

@@ -1,12 +1,13 @@
 //! The job that reads a session's calibration, finds out whose file is whose, and plans the rest of the run.
 
-use std::{sync::Arc, time::Instant};
+use std::sync::Arc;
 
 use bytes::Bytes;
-use formats::{calibration, image_files};
+use formats::{FileRole, calibration, image_files};
 use jobs::{
-    CamerasPlanned, InputFile, JobReport, PLAN_MULTI_VIEW, PlanMultiView, SOLVE_INVERSE_KINEMATICS,
-    SolveInverseKinematics, Source, SourceKind,
+    InputFile, JobReport,
+    inverse_kinematics::{CamerasPlanned, SolveInverseKinematics},
+    multi_view::{FitShape, MakeSilhouettes, PlanMultiView, Source, SourceKind},
 };
 use model::Camera;
 use multi_view::CameraRecord;
@@ -14,43 +15,30 @@ use queue::{ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{FileError, compute};
 
 use crate::{
-    INITIALISE_BODY, InputError, MAKE_SILHOUETTES, Shared,
-    children::INITIALISE_WEIGHT,
+    InputError, Shared,
+    children::FIT_WEIGHT,
     members,
-    payload::{InitialiseBody, MakeSilhouettes},
     sources::{self, CameraSources},
 };
 
 /// Largest calibration file, bytes.
 const MAX_CALIBRATION_BYTES: u64 = 64 << 20;
-/// Attempts of a camera: more than usual, as one may be lost with each worker that is taken away.
-const CAMERA_ATTEMPTS: i32 = 5;
 /// Share of the last job in the run's progress, where nothing follows it; that of a camera is 1.
 const LAST_WEIGHT: f64 = 2.0;
 
 pub(crate) struct PlanHandler {
-    shared: Arc<Shared>,
-}
-
-impl PlanHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
+    pub shared: Arc<Shared>,
 }
 
 impl Handler for PlanHandler {
-    fn kind(&self) -> &'static str {
-        PLAN_MULTI_VIEW
-    }
+    type Job = PlanMultiView;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let started = Instant::now();
-        let request: PlanMultiView = job.payload()?;
+    async fn run(&self, context: JobContext, request: PlanMultiView) -> Result<Outcome, JobError> {
         request.parameters.check().map_err(InputError::from)?;
-        job.progress(0.1, "reading the calibration");
+        context.progress(0.1, "reading the calibration");
         // What is wrong with the model is said now, not when all silhouettes are made.
         self.shared.models.get(&request.body_model).await?;
-        let (sources, picture_size) = self.sources(&job, &request).await?;
+        let (sources, picture_size) = self.sources(&context, &request).await?;
         let file = calibration_file(&request.files)?;
         let bytes = self.shared.resources.read_file(file, MAX_CALIBRATION_BYTES).await?;
         let (mut warnings, cameras) = read_calibration(&request, file, &bytes, picture_size)?;
@@ -59,7 +47,7 @@ impl Handler for PlanHandler {
             sources::match_cameras(sources, &names, &request.cameras, &request.camera_files, &mut warnings)?;
         // measured points say where the person is; without them it takes two views
         sources::check_count(&matched, if request.inverse_kinematics.is_some() { 1 } else { 2 })?;
-        let plan = self.shared.resources.job_report(&job, started, 0);
+        let plan = self.shared.resources.job_report(&context, 0);
         Ok(Outcome::default().children(children(request, &cameras, matched, warnings, plan)?))
     }
 }
@@ -68,23 +56,23 @@ impl PlanHandler {
     /// All sources of pictures, and the size of the first picture in an archive, for calibrations that don't say it.
     async fn sources(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         request: &PlanMultiView,
     ) -> Result<(Vec<Source>, Option<[u32; 2]>), JobError> {
         let resources = &self.shared.resources;
         let most = resources.memory.max_build_bytes;
         let (mut found, mut size) = (Vec::new(), None);
         for file in &request.files {
-            job.check()?;
+            context.check()?;
             if !sources::is_archive(file) {
-                found.extend(sources::of_file(file));
+                found.extend(sources::from_file(file));
                 continue;
             }
-            job.progress(0.2, format!("looking into {}", file.name));
+            context.progress(0.2, format!("looking into {}", file.name));
             let bytes = resources.read_file(file, resources.memory.max_object_bytes).await?;
-            let (of, needs_size) = (file.clone(), size.is_none());
+            let (archive, needs_size) = (file.clone(), size.is_none());
             let (sources, first) = compute::run(move || -> Result<_, InputError> {
-                let sources = sources::of_archive(&of, &bytes, most)?;
+                let sources = sources::from_archive(&archive, &bytes, most)?;
                 let first = if needs_size { first_size(&sources, &bytes, most)? } else { None };
                 Ok((sources, first))
             })
@@ -101,8 +89,8 @@ fn first_size(sources: &[Source], bytes: &Bytes, max_bytes: u64) -> Result<Optio
     let Some(source) = sources.iter().find(|source| source.kind != SourceKind::Plate) else {
         return Ok(None);
     };
-    let Some(of_source) = &source.members else { return Ok(None) };
-    let entries = members::read(&source.file.name, bytes, of_source, max_bytes)?;
+    let Some(wanted) = &source.members else { return Ok(None) };
+    let entries = members::read(&source.file.name, bytes, wanted, max_bytes)?;
     Ok(entries
         .first()
         .and_then(|first| image_files::size(&first.bytes, &image_files::Limits::default()).ok()))
@@ -110,13 +98,14 @@ fn first_size(sources: &[Source], bytes: &Bytes, max_bytes: u64) -> Result<Optio
 
 /// The only calibration of a session.
 fn calibration_file(files: &[InputFile]) -> Result<&InputFile, InputError> {
-    let found: Vec<&InputFile> = files.iter().filter(|file| file.role == "calibration").collect();
+    let found: Vec<&InputFile> = files.iter().filter(|file| file.role == FileRole::Calibration).collect();
     match found[..] {
         [only] => Ok(only),
         _ => {
             let names: Vec<&str> = found.iter().map(|file| file.name.as_str()).collect();
             let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
-            Err(FileError::Count { role: "calibration", found: found.len(), names, expected: "one" }.into())
+            Err(FileError::Count { role: FileRole::Calibration, found: found.len(), names, expected: "one" }
+                .into())
         }
     }
 }
@@ -128,9 +117,7 @@ fn read_calibration(
     bytes: &Bytes,
     image_size: Option<[u32; 2]>,
 ) -> Result<(Vec<String>, Vec<Camera>), InputError> {
-    let up = request.up.as_ref().map(|up| up.parse()).transpose();
-    let up =
-        up.map_err(|_| FileError::unexpected("up", format!("{:?}", request.up), "x, y, z, -x, -y or -z"))?;
+    let up = request.up.map(Into::into);
     let options = calibration::Options { up, metres_per_unit: request.metres_per_unit, image_size };
     let read = calibration::read(&file.name, bytes, &options).map_err(FileError::in_file(&file.name))?;
     let warnings = read.warnings.into_iter().map(|w| format!("{}: {}", file.name, w.message)).collect();
@@ -144,41 +131,35 @@ fn children(
     matched: Vec<CameraSources>,
     warnings: Vec<String>,
     plan: JobReport,
-) -> Result<Vec<ChildJob>, JobError> {
+) -> Result<Vec<ChildJob>, queue::Error> {
     let num_cameras = matched.len();
     let goes_on = request.parameters.track && request.inverse_kinematics.is_none();
-    let last_weight = if goes_on { INITIALISE_WEIGHT } else { LAST_WEIGHT };
+    let last_weight = if goes_on { FIT_WEIGHT } else { LAST_WEIGHT };
     let mut parameters = request.parameters.clone();
     // points of clothes are for those who follow a person
     parameters.texture &= goes_on;
     let mut jobs = Vec::with_capacity(num_cameras + 1);
-    for (index, of) in matched.into_iter().enumerate() {
-        let payload = MakeSilhouettes {
+    for (index, sources) in matched.into_iter().enumerate() {
+        jobs.push(ChildJob::new(&MakeSilhouettes {
             index,
-            camera: CameraRecord::from(&cameras[of.camera]),
-            source: of.pictures,
-            plate: of.plate,
+            camera: CameraRecord::from(&cameras[sources.camera]),
+            source: sources.pictures,
+            plate: sources.plate,
             parameters: parameters.clone(),
-        };
-        let payload = serde_json::to_value(payload).map_err(JobError::retry)?;
-        jobs.push(ChildJob::new(MAKE_SILHOUETTES, payload).max_attempts(CAMERA_ATTEMPTS));
+        })?);
     }
-    let (kind, payload) = match request.inverse_kinematics.clone() {
-        Some(how) => {
-            let solve = SolveInverseKinematics {
-                session_id: request.session_id,
-                session_name: request.session_name,
-                body_model: request.body_model,
-                files: request.files,
-                up: request.up,
-                how,
-                cameras: Some(CamerasPlanned { first_frame: request.parameters.first_frame, warnings, plan }),
-            };
-            (SOLVE_INVERSE_KINEMATICS, serde_json::to_value(solve))
-        }
-        None => (INITIALISE_BODY, serde_json::to_value(InitialiseBody { request, warnings, plan })),
+    let last = match request.inverse_kinematics.clone() {
+        Some(how) => ChildJob::new(&SolveInverseKinematics {
+            session_id: request.session_id,
+            session_name: request.session_name,
+            body_model: request.body_model,
+            files: request.files,
+            up: request.up,
+            how,
+            cameras: Some(CamerasPlanned { first_frame: request.parameters.first_frame, warnings, plan }),
+        }),
+        None => ChildJob::new(&FitShape { request, warnings, plan }),
     };
-    let payload = payload.map_err(JobError::retry)?;
-    jobs.push(ChildJob::new(kind, payload).weight(last_weight).depends_on(0..num_cameras));
+    jobs.push(last?.weight(last_weight).depends_on(0..num_cameras));
     Ok(jobs)
 }

@@ -135,7 +135,7 @@ impl<'a, S: Sink> Packer<'a, S> {
 ///
 /// # Errors
 /// The first mask that is none, with its name.
-pub(crate) fn of_masks(
+pub(crate) fn from_masks(
     name: &str,
     entries: &[Entry],
     parameters: &Parameters,
@@ -194,7 +194,7 @@ pub(crate) fn painted(mask: &Silhouette) -> Image {
 ///
 /// # Errors
 /// If frames can't be read, or no background can be learned.
-pub(crate) fn of_frames(
+pub(crate) fn from_frames(
     name: &str,
     frames: &Frames,
     plate: Option<&Image>,

@@ -1,15 +1,17 @@
 //! The job that makes the silhouettes of one camera.
 
-use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-    time::Instant,
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
 };
 
 use formats::{calibration::fit_to_image, image_files};
-use jobs::{CameraReport, ClipPlace, Source, clip_name, file_part, matches_name, picture_name, report_name};
+use jobs::{
+    file_part,
+    multi_view::{
+        CameraReport, ClipPlace, MakeSilhouettes, Source, clip_name, matches_name, picture_name, report_name,
+    },
+};
 use model::Image;
 use multi_view::CameraRecord;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
@@ -18,9 +20,8 @@ use tempfile::TempDir;
 use tokio::sync::mpsc;
 
 use crate::{
-    InputError, MAKE_SILHOUETTES, Shared,
+    InputError, Shared,
     opened::{Opened, entries, open},
-    payload::MakeSilhouettes,
     segment::{self, Made, Piece, Sink},
 };
 
@@ -30,34 +31,23 @@ const WAITING: usize = 2;
 const OUTLINE: [u8; 3] = [255, 230, 0];
 
 pub(crate) struct SilhouettesHandler {
-    shared: Arc<Shared>,
-}
-
-impl SilhouettesHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
+    pub shared: Arc<Shared>,
 }
 
 impl Handler for SilhouettesHandler {
-    fn kind(&self) -> &'static str {
-        MAKE_SILHOUETTES
-    }
+    type Job = MakeSilhouettes;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let started = Instant::now();
+    async fn run(&self, context: JobContext, payload: MakeSilhouettes) -> Result<Outcome, JobError> {
         let resources = &self.shared.resources;
         let store = &resources.store;
-        objects::clean_up_earlier_attempts(store, &job).await;
-        let payload: MakeSilhouettes = job.payload()?;
         let index = payload.index;
-        job.progress(0.0, format!("camera {}: reading {}", payload.camera.name, payload.source.name));
+        context.progress(0.0, format!("camera {}: reading {}", payload.camera.name, payload.source.name));
         let scratch = TempDir::new().map_err(JobError::retry)?;
         let opened =
             open(resources, &payload.source, payload.parameters.largest_side, scratch.path()).await?;
         let plate = self.plate(payload.plate.as_ref()).await?;
-        job.check()?;
-        let (made, written) = self.make(&job, &payload, opened, plate).await?;
+        context.check()?;
+        let (made, written) = self.make(&context, &payload, opened, plate).await?;
         let (camera, made) = made;
         let report = CameraReport {
             index,
@@ -70,16 +60,16 @@ impl Handler for SilhouettesHandler {
             warnings: made.made.warnings,
             clips: written.clips,
             matches: written.matches,
-            job: resources.job_report(&job, started, made.made.end_frame - payload.parameters.first_frame),
+            job: resources.job_report(&context, made.made.end_frame - payload.parameters.first_frame),
         };
         let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
-        let report = objects::write(store, &job, &report_name(index), "application/json", report).await?;
+        let report = objects::write(store, &context, &report_name(index), "application/json", report).await?;
         Ok(written.artefacts.into_iter().fold(Outcome::default(), Outcome::artefact).artefact(report))
     }
 }
 
 /// What came of a camera.
-struct OfCamera {
+struct Segmented {
     made: Made,
     frame_rate: Option<f64>,
 }
@@ -108,25 +98,26 @@ impl SilhouettesHandler {
     /// Makes silhouettes on a thread of their own and writes them as they come.
     async fn make(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         payload: &MakeSilhouettes,
         opened: Opened,
         plate: Option<Image>,
-    ) -> Result<((CameraRecord, OfCamera), Written), JobError> {
+    ) -> Result<((CameraRecord, Segmented), Written), JobError> {
         let (sender, mut receiver) = mpsc::channel(WAITING);
         let cancelled = Arc::new(AtomicBool::new(false));
-        let mut sink = JobSink { job: job.clone(), camera: payload.camera.name.clone(), sender, cancelled };
-        let of = payload.clone();
-        let made = compute::run(move || make(&of, &opened, plate.as_ref(), &mut sink));
+        let mut sink =
+            JobSink { context: context.clone(), camera: payload.camera.name.clone(), sender, cancelled };
+        let job = payload.clone();
+        let made = compute::run(move || make(&job, &opened, plate.as_ref(), &mut sink));
         let written = async {
             let mut written = Written::default();
             while let Some(piece) = receiver.recv().await {
-                self.write(job, payload, piece, &mut written).await?;
+                self.write(context, payload, piece, &mut written).await?;
             }
             Ok::<_, JobError>(written)
         };
         let (made, written) = tokio::join!(made, written);
-        job.check()?;
+        context.check()?;
         let written = written?;
         // stopped without a reason of the input's: the job is to end, and check() has said so, or nothing was written
         let made = made?.ok_or(JobError::Stopped)?;
@@ -135,7 +126,7 @@ impl SilhouettesHandler {
 
     async fn write(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         payload: &MakeSilhouettes,
         piece: Piece,
         written: &mut Written,
@@ -144,13 +135,14 @@ impl SilhouettesHandler {
         match piece {
             Piece::Clip { first_frame, num_frames, bytes, matches } => {
                 let name = clip_name(payload.index, first_frame);
-                let artefact = objects::write(store, job, &name, "application/octet-stream", bytes).await?;
+                let artefact =
+                    objects::write(store, context, &name, "application/octet-stream", bytes).await?;
                 written.artefacts.push(artefact);
                 written.clips.push(ClipPlace { name, first_frame, num_frames });
                 if let Some(bytes) = matches {
                     let name = matches_name(payload.index, first_frame);
                     let artefact =
-                        objects::write(store, job, &name, "application/octet-stream", bytes).await?;
+                        objects::write(store, context, &name, "application/octet-stream", bytes).await?;
                     written.artefacts.push(artefact);
                     written.matches.push(ClipPlace { name, first_frame, num_frames });
                 }
@@ -163,10 +155,12 @@ impl SilhouettesHandler {
                 })
                 .await;
                 let name = picture_name(payload.index, frame);
-                written.artefacts.push(objects::write(store, job, &name, "image/png", plain).await?);
+                written.artefacts.push(objects::write(store, context, &name, "image/png", plain).await?);
                 // A run that fails later shows here what its cameras saw.
                 let name = format!("silhouette_{}.png", file_part(&payload.camera.name, payload.index));
-                written.artefacts.push(objects::write_result(store, job, &name, "image/png", drawn).await?);
+                written
+                    .artefacts
+                    .push(objects::write_result(store, context, &name, "image/png", drawn).await?);
             }
         }
         Ok(())
@@ -179,7 +173,7 @@ fn make(
     opened: &Opened,
     plate: Option<&Image>,
     sink: &mut JobSink,
-) -> Result<Option<(CameraRecord, OfCamera)>, InputError> {
+) -> Result<Option<(CameraRecord, Segmented)>, InputError> {
     let calibrated = payload
         .camera
         .camera()
@@ -203,20 +197,20 @@ fn make(
     let name = &payload.source.name;
     let cancelled = sink.cancelled.clone();
     let made = match opened {
-        Opened::Masks(entries) => segment::of_masks(name, entries, &payload.parameters, sink)?,
+        Opened::Masks(entries) => segment::from_masks(name, entries, &payload.parameters, sink)?,
         Opened::Frames(frames) => {
-            segment::of_frames(name, frames, plate, &payload.parameters, &cancelled, sink)?
+            segment::from_frames(name, frames, plate, &payload.parameters, &cancelled, sink)?
         }
     };
     let Some(mut made) = made else { return Ok(None) };
     let assumed = fitted.warnings.into_iter().map(|warning| warning.message);
     made.warnings = assumed.chain(made.warnings).collect();
-    Ok(Some((CameraRecord::from(&fitted.value), OfCamera { made, frame_rate })))
+    Ok(Some((CameraRecord::from(&fitted.value), Segmented { made, frame_rate })))
 }
 
 /// Sends pieces to where they are written, and progress to the user.
 struct JobSink {
-    job: JobContext,
+    context: JobContext,
     camera: String,
     sender: mpsc::Sender<Piece>,
     cancelled: Arc<AtomicBool>,
@@ -224,7 +218,7 @@ struct JobSink {
 
 impl JobSink {
     fn goes_on(&self) -> bool {
-        let is_over = self.job.is_cancelled();
+        let is_over = self.context.is_cancelled();
         if is_over {
             self.cancelled.store(true, Ordering::Relaxed);
         }
@@ -239,11 +233,11 @@ impl Sink for JobSink {
     }
 
     fn frame_done(&mut self, done: usize, expected: Option<usize>) -> bool {
-        let of = expected.map_or_else(String::new, |count| format!(" of {count}"));
+        let total = expected.map_or_else(String::new, |count| format!(" of {count}"));
         let share = expected.map_or(0.5, |count| done as f64 / count.max(1) as f64);
         let phrase =
-            if done == 0 { "learning the background".to_owned() } else { format!("frame {done}{of}") };
-        self.job.progress(share.min(0.99), format!("camera {}: {phrase}", self.camera));
+            if done == 0 { "learning the background".to_owned() } else { format!("frame {done}{total}") };
+        self.context.progress(share.min(0.99), format!("camera {}: {phrase}", self.camera));
         self.goes_on()
     }
 }

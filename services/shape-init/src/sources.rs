@@ -3,7 +3,11 @@
 use std::collections::BTreeMap;
 
 use bytes::Bytes;
-use jobs::{InputFile, Members, Source, SourceKind};
+use formats::FileRole;
+use jobs::{
+    InputFile,
+    multi_view::{Members, Source, SourceKind},
+};
 use multi_view::{assign, find_camera};
 use service::FileError;
 
@@ -22,27 +26,36 @@ pub(crate) struct CameraSources {
 }
 
 /// How a file is read, by its role; `None` for those that hold no pictures.
-pub(crate) fn kind_of(role: &str) -> Option<SourceKind> {
+fn source_kind(role: FileRole) -> Option<SourceKind> {
     match role {
-        "video" => Some(SourceKind::Video),
-        "images" => Some(SourceKind::Images),
-        "masks" => Some(SourceKind::Masks),
-        "plate" => Some(SourceKind::Plate),
-        _ => None,
+        FileRole::Video => Some(SourceKind::Video),
+        FileRole::Images => Some(SourceKind::Images),
+        FileRole::Masks => Some(SourceKind::Masks),
+        FileRole::Plate => Some(SourceKind::Plate),
+        FileRole::Skeleton
+        | FileRole::ControlPoints
+        | FileRole::GroundTruth
+        | FileRole::Motion
+        | FileRole::Scans
+        | FileRole::Calibration => None,
     }
 }
 
 /// Whether the file has to be looked into to know its sources.
 pub(crate) fn is_archive(file: &InputFile) -> bool {
-    kind_of(&file.role).is_some_and(|kind| kind != SourceKind::Video) && !is_picture(&file.name)
+    source_kind(file.role).is_some_and(|kind| kind != SourceKind::Video) && !is_picture(&file.name)
 }
 
 /// The sources of an archive: folders of frames, or single plates.
 ///
 /// # Errors
 /// If the archive is damaged or holds no picture.
-pub(crate) fn of_archive(file: &InputFile, bytes: &Bytes, max_bytes: u64) -> Result<Vec<Source>, InputError> {
-    let Some(kind) = kind_of(&file.role) else { return Ok(Vec::new()) };
+pub(crate) fn from_archive(
+    file: &InputFile,
+    bytes: &Bytes,
+    max_bytes: u64,
+) -> Result<Vec<Source>, InputError> {
+    let Some(kind) = source_kind(file.role) else { return Ok(Vec::new()) };
     let names = pictures(&file.name, bytes, max_bytes)?;
     if names.is_empty() {
         return Err(FileError::unexpected(&file.name, "no PNG or JPEG in it", "pictures, one a frame").into());
@@ -54,7 +67,7 @@ pub(crate) fn of_archive(file: &InputFile, bytes: &Bytes, max_bytes: u64) -> Res
     if kind == SourceKind::Plate {
         return Ok(names.iter().map(|name| source(name, Members::One(name.clone()))).collect());
     }
-    let of_group = |members: Members| {
+    let from_group = |members: Members| {
         let inside = match &members {
             Members::Prefix { folder, prefix } if !folder.is_empty() => format!("{folder}/{prefix}"),
             Members::Folder(inside) | Members::One(inside) | Members::Prefix { prefix: inside, .. } => {
@@ -63,12 +76,12 @@ pub(crate) fn of_archive(file: &InputFile, bytes: &Bytes, max_bytes: u64) -> Res
         };
         source(&inside, members)
     };
-    Ok(groups(&names).into_iter().map(of_group).collect())
+    Ok(groups(&names).into_iter().map(from_group).collect())
 }
 
 /// The source that a file is by itself.
-pub(crate) fn of_file(file: &InputFile) -> Option<Source> {
-    let kind = kind_of(&file.role)?;
+pub(crate) fn from_file(file: &InputFile) -> Option<Source> {
+    let kind = source_kind(file.role)?;
     Some(Source { name: file.name.clone(), kind, file: file.clone(), members: None })
 }
 

@@ -8,10 +8,10 @@ use evaluation::{
     Comparison, ContactThresholds, FootPaths, FootSlide, at_60_hz, compare_in_detail, foot_slide,
     report::{About, run_errors, run_report},
 };
-use formats::BvhOptions;
+use formats::{BvhOptions, FileRole, session};
 use kinematics::{Parametrisation, References};
 use model::Motion;
-use reconstruction::{NamedBytes, Reading, Truth, truth_of};
+use reconstruction::{NamedBytes, Truth, truth_of};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -20,10 +20,6 @@ use super::written::{command, write};
 
 /// Most bytes of an unpacked file.
 const MAX_BYTES: u64 = 2 << 30;
-/// Role of the file that has the truth.
-const TRUTH: &str = "ground-truth";
-/// Role of the file that has the performer's skeleton.
-const SKELETON: &str = "skeleton";
 
 /// `marey evaluate run`
 #[derive(Debug, clap::Args)]
@@ -63,7 +59,7 @@ struct Run {
 #[derive(Debug, Deserialize)]
 struct SessionFile {
     name: String,
-    role: String,
+    role: FileRole,
     blake3: String,
 }
 
@@ -89,7 +85,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let downloads = Downloads { client: &client, folder: tempfile::tempdir()? };
     let session = run.session_id.as_deref().context("the run's session is not there any more")?;
     let files = inputs(args, &downloads, session)?;
-    let Some(name) = files.iter().find(|f| f.role == TRUTH).map(|f| f.name.clone()) else {
+    let Some(name) = files.iter().find(|f| f.role == FileRole::GroundTruth).map(|f| f.name.clone()) else {
         bail!(
             "run {} has no truth to be compared with: its session has no file of role ground-truth; upload the true motion on \
              the session's skeleton (`marey upload {session} truth.amc`, or a .bvh), or give it: `marey evaluate run {} --truth FILE`",
@@ -98,7 +94,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         );
     };
     let found = downloads.motion(&run.id, is_bvh(&name))?;
-    let mut reading = Reading::default();
+    let mut reading = session::Options::default();
     if let Some(metres) = run.parameters["bvh_metres_per_unit"].as_f64() {
         reading.bvh.metres_per_unit = metres;
     }
@@ -142,7 +138,7 @@ fn inputs(args: &Args, downloads: &Downloads<'_>, session: &str) -> anyhow::Resu
     let listed: Vec<SessionFile> = downloads.client.get(&session)?;
     let mut files = Vec::new();
     for file in listed {
-        if file.role == SKELETON || (file.role == TRUTH && args.truth.is_none()) {
+        if file.role == FileRole::Skeleton || (file.role == FileRole::GroundTruth && args.truth.is_none()) {
             let bytes = downloads.get(&format!("{session}/{}", encode(&file.name)), &file.blake3)?;
             files.push(NamedBytes { name: file.name, role: file.role, bytes: bytes.into() });
         }
@@ -150,7 +146,7 @@ fn inputs(args: &Args, downloads: &Downloads<'_>, session: &str) -> anyhow::Resu
     if let Some(path) = &args.truth {
         let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        files.push(NamedBytes { name, role: TRUTH.to_owned(), bytes: bytes.into() });
+        files.push(NamedBytes { name, role: FileRole::GroundTruth, bytes: bytes.into() });
     }
     files.into_iter().map(|file| Ok(file.unpacked(MAX_BYTES)?)).collect()
 }

@@ -10,12 +10,12 @@ use tokio::time::{Instant, timeout};
 use tokio_util::task::AbortOnDropHandle;
 use tracing::Instrument;
 
-use super::Shared;
 use super::context::{Held, JobContext, Stop};
-use super::handler::{DynHandler, JobError, Outcome};
+use super::handler::{DynHandler, Outcome};
 use super::link::Reconnect;
+use super::shared::Shared;
 use crate::finish::{Completion, Failure, Settled, acknowledge_cancel, complete, fail, hand_back};
-use crate::{ClaimedJob, Error, Lease};
+use crate::{ClaimedJob, Error, JobError, Lease};
 
 /// Runs the job and returns when its end is acknowledged (or its lease is lost).
 pub(super) async fn attempt(shared: Arc<Shared>, job: ClaimedJob) {
@@ -53,8 +53,15 @@ enum End {
 
 async fn run(shared: &Shared, handler: Arc<dyn DynHandler>, job: &Arc<ClaimedJob>, held: &Arc<Held>) -> End {
     let context = JobContext::new(job.clone(), held.clone());
+    let before = shared.before_attempt.clone();
     // A task of its own: a panic ends the task, not the worker.
-    let task = tokio::spawn(async move { handler.run(context).await }.in_current_span());
+    let task = async move {
+        if let Some(before) = before {
+            before(context.clone()).await;
+        }
+        handler.run(context).await
+    };
+    let task = tokio::spawn(task.in_current_span());
     // Aborts it when it is left behind, or the whole worker is.
     let mut task = AbortOnDropHandle::new(task);
     let result = tokio::select! {

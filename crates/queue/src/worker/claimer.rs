@@ -8,12 +8,12 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
-use super::Shared;
 use super::attempt::attempt;
 use super::context::Stop;
 use super::keeper::keep;
 use super::link::{Link, Reconnect};
 use super::listener::listen;
+use super::shared::Shared;
 use crate::{ClaimedJob, Error, claim, is_any_available, reap};
 
 /// Between two claims of a busy worker, so that one claim fills several slots.

@@ -2,26 +2,26 @@
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
-use serde::de::DeserializeOwned;
-use serde_json::Value;
 use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
 
-use super::handler::{JobError, read_payload};
 use crate::lease::clamp;
-use crate::{ClaimedJob, JobId, Lease, LeaseNumber, ProjectId, RunId};
+use crate::{ClaimedJob, Job, JobError, JobId, Lease, LeaseNumber, ProjectId, RunId};
 
 /// One attempt at a job, as its [`Handler`](super::Handler) sees it. Cheap to clone.
 #[derive(Clone)]
 pub struct JobContext {
     job: Arc<ClaimedJob>,
     held: Arc<Held>,
+    started: Instant,
 }
 
 impl JobContext {
+    /// Of an attempt that begins now.
     pub(super) fn new(job: Arc<ClaimedJob>, held: Arc<Held>) -> Self {
-        Self { job, held }
+        Self { job, held, started: Instant::now() }
     }
 
     /// The job.
@@ -55,17 +55,31 @@ impl JobContext {
         self.job.lease_number
     }
 
-    /// The payload, read.
-    ///
-    /// # Errors
-    /// [`JobError::GiveUp`] if it is not a `T`.
-    pub fn payload<T: DeserializeOwned>(&self) -> Result<T, JobError> {
-        read_payload(&self.job.kind, &self.job.payload)
+    /// How long the attempt has taken so far.
+    pub fn elapsed(&self) -> Duration {
+        self.started.elapsed()
     }
 
-    /// The payload as it was enqueued.
-    pub fn raw_payload(&self) -> &Value {
-        &self.job.payload
+    /// What the job was given.
+    ///
+    /// # Errors
+    /// [`JobError::GiveUp`] if it is not a `J`, or of a version that a `J` can't be made of: bad input, not a crash.
+    pub(super) fn read<J: Job>(&self) -> Result<J, JobError> {
+        let ClaimedJob { kind, payload, payload_version: version, .. } = &*self.job;
+        let unreadable =
+            |error| JobError::give_up(format!("the payload of this {kind} job cannot be read"), error);
+        if *version == J::VERSION {
+            return J::deserialize(payload).map_err(unreadable);
+        }
+        let Some(upgraded) = J::upgrade(*version, payload.clone()) else {
+            let message = format!(
+                "this {kind} job was enqueued by another version of the program: its payload has version {version}, this \
+                 one reads {}; start the run again",
+                J::VERSION
+            );
+            return Err(JobError::give_up(message, format!("no upgrade from {version} to {}", J::VERSION)));
+        };
+        J::deserialize(upgraded).map_err(unreadable)
     }
 
     /// Tells the user how far the job is: 0 to 1, and a phrase. Cheap enough for every frame: only the

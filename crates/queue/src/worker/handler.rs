@@ -1,11 +1,10 @@
 //! What a service implements to run one kind of job.
 
 use futures::future::BoxFuture;
-use serde_json::Value;
 use sqlx::PgConnection;
 
-use super::JobContext;
-use crate::{Artefact, ChildJob, Error};
+use super::context::JobContext;
+use crate::{Artefact, ChildJob, Job, JobError};
 
 /// Runs one kind of job.
 ///
@@ -22,22 +21,32 @@ use crate::{Artefact, ChildJob, Error};
 /// A panic is a failed attempt. Work that keeps a CPU busy belongs on `tokio::task::spawn_blocking`.
 pub trait Handler: Send + Sync + 'static {
     /// The kind of job that it runs.
-    fn kind(&self) -> &'static str;
+    type Job: Job;
 
     /// Runs one attempt at a job.
-    fn run(&self, job: JobContext) -> impl Future<Output = Result<Outcome, JobError>> + Send;
+    fn run(
+        &self,
+        context: JobContext,
+        job: Self::Job,
+    ) -> impl Future<Output = Result<Outcome, JobError>> + Send;
 }
 
-/// [`Handler`] as a trait object.
+/// [`Handler`] as a trait object, whatever its kind of job.
 pub(super) trait DynHandler: Send + Sync + 'static {
-    fn run(&self, job: JobContext) -> BoxFuture<'_, Result<Outcome, JobError>>;
+    fn run(&self, context: JobContext) -> BoxFuture<'_, Result<Outcome, JobError>>;
 }
 
 impl<H: Handler> DynHandler for H {
-    fn run(&self, job: JobContext) -> BoxFuture<'_, Result<Outcome, JobError>> {
-        Box::pin(Handler::run(self, job))
+    fn run(&self, context: JobContext) -> BoxFuture<'_, Result<Outcome, JobError>> {
+        Box::pin(async move {
+            let job = context.read()?;
+            Handler::run(self, context, job).await
+        })
     }
 }
+
+/// What is done before every attempt at a job, whatever its kind.
+pub(super) type BeforeAttempt = dyn Fn(JobContext) -> BoxFuture<'static, ()> + Send + Sync;
 
 /// SQL of a handler's own, run in the transaction that completes the job. It may be run again when that
 /// transaction could not be committed.
@@ -82,65 +91,4 @@ impl Outcome {
         self.on_complete = Some(Box::new(statements));
         self
     }
-}
-
-/// Why an attempt did not succeed.
-#[derive(Debug, thiserror::Error)]
-pub enum JobError {
-    /// Something outside failed that may work later: the network, the object store, a lock.
-    #[error("{detail}")]
-    Retry {
-        /// For a developer.
-        detail: String,
-    },
-    /// The input is bad: no further attempt will help.
-    #[error("{message}: {detail}")]
-    GiveUp {
-        /// For the user, who can do something about it.
-        message: String,
-        /// For a developer.
-        detail: String,
-    },
-    /// It stopped because [`JobContext::is_cancelled`] said so.
-    #[error("stopped before the end")]
-    Stopped,
-    /// The database failed; the attempt, or in [`Outcome::on_complete`] the completion, is tried again.
-    #[error("database: {0}")]
-    Database(#[from] sqlx::Error),
-}
-
-impl JobError {
-    /// An attempt that may succeed later.
-    pub fn retry(detail: impl ToString) -> Self {
-        Self::Retry { detail: detail.to_string() }
-    }
-
-    /// Bad input. `message` is for the user, `detail` for a developer.
-    pub fn give_up(message: impl Into<String>, detail: impl ToString) -> Self {
-        Self::GiveUp { message: message.into(), detail: detail.to_string() }
-    }
-
-    /// Bad input of which an error tells everything: its message is for the user, all that it holds for a developer.
-    pub fn bad_input(error: impl std::error::Error) -> Self {
-        Self::give_up(error.to_string(), format!("{error:?}"))
-    }
-}
-
-impl From<Error> for JobError {
-    fn from(error: Error) -> Self {
-        match error {
-            Error::Database(error) => Self::Database(error),
-            Error::OnComplete(error) => error,
-            error => Self::retry(error),
-        }
-    }
-}
-
-/// Reads a payload; one that cannot be read is bad input, not a crash.
-pub(super) fn read_payload<T: serde::de::DeserializeOwned>(
-    kind: &str,
-    payload: &Value,
-) -> Result<T, JobError> {
-    T::deserialize(payload)
-        .map_err(|error| JobError::give_up(format!("the payload of this {kind} job cannot be read"), error))
 }

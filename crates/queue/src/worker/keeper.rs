@@ -7,9 +7,9 @@ use std::time::Duration;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
-use super::Shared;
 use super::context::{Held, Stop};
 use super::link::{Link, Reconnect};
+use super::shared::Shared;
 use crate::{Beat, BeatAnswer, Error, heartbeat, heartbeat_interval, staleness};
 
 /// Progress is sent this often at most.

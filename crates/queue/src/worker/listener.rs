@@ -3,20 +3,11 @@
 use std::sync::Arc;
 
 use sqlx::postgres::{PgListener, PgPoolOptions};
-use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
 
-use super::Shared;
 use super::link::Reconnect;
+use super::shared::Shared;
 use crate::{Error, channels};
-
-/// Who is woken by what.
-pub(super) struct Wake {
-    /// Something may be available.
-    pub(super) available: Notify,
-    /// Something may be cancelled.
-    pub(super) cancelled: Notify,
-}
 
 /// Listens until `done`, over a connection of its own. Subscribes before it wakes for the first time, so
 /// that nothing which is enqueued after the look that follows goes unheard.

@@ -7,12 +7,14 @@ mod handler;
 mod keeper;
 mod link;
 mod listener;
+mod shared;
 
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use futures::future::BoxFuture;
 use sqlx::PgPool;
 use tokio::sync::{Notify, watch};
 use tokio::task::JoinHandle;
@@ -20,30 +22,12 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 pub use context::JobContext;
-pub use handler::{Handler, JobError, OnComplete, Outcome};
+pub use handler::{Handler, OnComplete, Outcome};
 
-use crate::RetryPolicy;
+use crate::{Job, RetryPolicy};
 use context::HeldJobs;
-use handler::DynHandler;
-use listener::Wake;
-
-/// What the tasks of one worker share.
-struct Shared {
-    pool: PgPool,
-    name: String,
-    handlers: HashMap<&'static str, Arc<dyn DynHandler>>,
-    concurrency: usize,
-    poll_interval: Duration,
-    grace: Duration,
-    patience: Duration,
-    retry: RetryPolicy,
-    shutdown: CancellationToken,
-    held: HeldJobs,
-    wake: Wake,
-    /// Unknown until the database has been reached.
-    heartbeat_interval: watch::Sender<Option<Duration>>,
-    is_connected: AtomicBool,
-}
+use handler::{BeforeAttempt, DynHandler};
+use shared::{Shared, Wake};
 
 /// Entrance to [`WorkerBuilder`].
 pub struct Worker;
@@ -56,6 +40,7 @@ impl Worker {
             pool,
             name: format!("worker-{}", Uuid::now_v7()),
             handlers: HashMap::new(),
+            before_attempt: None,
             concurrency: 1,
             poll_interval: Duration::from_secs(1),
             grace: Duration::from_secs(10),
@@ -70,6 +55,7 @@ pub struct WorkerBuilder {
     pool: PgPool,
     name: String,
     handlers: HashMap<&'static str, Arc<dyn DynHandler>>,
+    before_attempt: Option<Arc<BeforeAttempt>>,
     concurrency: usize,
     poll_interval: Duration,
     grace: Duration,
@@ -80,8 +66,18 @@ pub struct WorkerBuilder {
 impl WorkerBuilder {
     /// Runs jobs of this handler's kind; a later handler of a kind replaces an earlier one.
     #[must_use]
-    pub fn handler(mut self, handler: impl Handler) -> Self {
-        self.handlers.insert(handler.kind(), Arc::new(handler));
+    pub fn handler<H: Handler>(mut self, handler: H) -> Self {
+        self.handlers.insert(H::Job::KIND, Arc::new(handler));
+        self
+    }
+
+    /// Does this before every attempt at a job, whatever its kind, as a part of the attempt.
+    #[must_use]
+    pub fn before_attempt(
+        mut self,
+        before: impl Fn(JobContext) -> BoxFuture<'static, ()> + Send + Sync + 'static,
+    ) -> Self {
+        self.before_attempt = Some(Arc::new(before));
         self
     }
 
@@ -135,6 +131,7 @@ impl WorkerBuilder {
             pool: self.pool,
             name: self.name,
             handlers: self.handlers,
+            before_attempt: self.before_attempt,
             concurrency: self.concurrency,
             poll_interval: self.poll_interval,
             grace: self.grace,

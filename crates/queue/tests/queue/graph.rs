@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use queue::{Artefact, ChildJob, JobError, NewJob, Outcome, RunState};
+use queue::{Artefact, JobContext, JobError, NewJob, Outcome, RunState};
 use serde_json::json;
 use tokio_util::sync::CancellationToken;
 
-use crate::support::{Queue, does, jobs};
+use crate::support::{After, Build, Chunk, Merge, Other, Plan, Queue, does, job, jobs, reads};
 
 fn artefact(name: &str, store_key: String, is_result: bool) -> Artefact {
     Artefact {
@@ -23,18 +23,17 @@ fn artefact(name: &str, store_key: String, is_result: bool) -> Artefact {
 async fn a_thousand_chunks_fan_out_of_one_job_and_into_one() {
     const CHUNKS: usize = 1000;
     let queue = Queue::new().await;
-    let plan = does("plan", async |_| {
-        let mut children = jobs("chunk", CHUNKS);
-        children.push(ChildJob::new("merge", json!(null)).depends_on(0..CHUNKS));
+    let plan = does(Plan, async |_| {
+        let mut children = jobs(Chunk, CHUNKS);
+        children.push(job(Merge, json!(null)).depends_on(0..CHUNKS));
         Ok(Outcome::default().children(children))
     });
-    let chunk = does("chunk", async |job| {
-        let index: usize = job.payload()?;
-        let key = format!("{}/{}/{index}", job.id(), job.lease_number());
+    let chunk = reads(async |context: JobContext, Chunk(index)| {
+        let key = format!("{}/{}/{index}", context.id(), context.lease_number());
         Ok(Outcome::default().artefact(artefact("poses", key, false)))
     });
     let pool = queue.pool.clone();
-    let merge = does("merge", move |job| {
+    let merge = does(Merge, move |job| {
         let pool = pool.clone();
         async move {
             let mut connection = pool.acquire().await?;
@@ -50,7 +49,7 @@ async fn a_thousand_chunks_fan_out_of_one_job_and_into_one() {
         }
     });
     let began = Instant::now();
-    let (run_id, _) = queue.run(&[ChildJob::new("plan", json!(null))]).await;
+    let (run_id, _) = queue.run(&[job(Plan, json!(null))]).await;
     let shutdown = CancellationToken::new();
     let _workers: Vec<_> = (0..2)
         .map(|_| {
@@ -75,15 +74,15 @@ async fn a_thousand_chunks_fan_out_of_one_job_and_into_one() {
 #[tokio::test]
 async fn a_job_may_depend_on_jobs_that_have_succeeded_already() {
     let queue = Queue::new().await;
-    let (run_id, ids) = queue.run(&[jobs("chunk", 1), jobs("other", 1)].concat()).await;
+    let (run_id, ids) = queue.run(&[jobs(Chunk, 1), jobs(Other, 1)].concat()).await;
     let job = queue.claim("chunk", 1).await.remove(0);
     let mut connection = queue.pool.acquire().await.unwrap();
     queue::complete(&mut connection, &crate::leases::lease(&job), &queue::Completion::default())
         .await
         .unwrap();
-    let after = NewJob { depends_on: &ids[..1], ..NewJob::new(run_id, "after", json!(null)) };
+    let after = NewJob { depends_on: &ids[..1], ..NewJob::new(run_id, &After(json!(null))).unwrap() };
     queue::enqueue(&mut connection, &after).await.unwrap();
-    let after_both = NewJob { depends_on: &ids, ..NewJob::new(run_id, "after", json!(null)) };
+    let after_both = NewJob { depends_on: &ids, ..NewJob::new(run_id, &After(json!(null))).unwrap() };
     queue::enqueue(&mut connection, &after_both).await.unwrap();
     assert_eq!(queue.claim("after", 9).await.len(), 1);
 }
@@ -91,16 +90,16 @@ async fn a_job_may_depend_on_jobs_that_have_succeeded_already() {
 #[tokio::test]
 async fn dependencies_that_cannot_be_are_refused() {
     let queue = Queue::new().await;
-    let (run_id, _) = queue.run(&jobs("chunk", 1)).await;
-    let (_, elsewhere) = queue.run(&jobs("chunk", 1)).await;
+    let (run_id, _) = queue.run(&jobs(Chunk, 1)).await;
+    let (_, elsewhere) = queue.run(&jobs(Chunk, 1)).await;
     let mut connection = queue.pool.acquire().await.unwrap();
-    let on_itself = [ChildJob::new("chunk", json!(0)).depends_on([0])];
+    let on_itself = [job(Chunk, json!(0)).depends_on([0])];
     let refused = queue::enqueue_many(&mut connection, run_id, &on_itself).await;
     assert!(matches!(refused, Err(queue::Error::DependencyNotEarlier { index: 0, depends_on: 0 })));
-    let of_another_run = NewJob { depends_on: &elsewhere, ..NewJob::new(run_id, "chunk", json!(0)) };
+    let of_another_run = NewJob { depends_on: &elsewhere, ..NewJob::new(run_id, &Chunk(json!(0))).unwrap() };
     let refused = queue::enqueue(&mut connection, &of_another_run).await;
     assert!(matches!(refused, Err(queue::Error::NoSuchDependency { found: 0, expected: 1, .. })));
-    let nowhere = NewJob::new(queue::RunId(uuid::Uuid::nil()), "chunk", json!(0));
+    let nowhere = NewJob::new(queue::RunId(uuid::Uuid::nil()), &Chunk(json!(0))).unwrap();
     assert!(matches!(queue::enqueue(&mut connection, &nowhere).await, Err(queue::Error::NoSuchRun(_))));
 }
 
@@ -108,7 +107,7 @@ async fn dependencies_that_cannot_be_are_refused() {
 async fn sql_of_the_handler_is_committed_with_the_completion_or_not_at_all() {
     let queue = Queue::new().await;
     queue.execute("CREATE TABLE indices (job_id bigint PRIMARY KEY, attempt integer)").await.unwrap();
-    let handler = does("build", async |job| {
+    let handler = does(Build, async |job| {
         let (id, attempt) = (job.id(), job.attempt());
         let outcome = Outcome::default().artefact(artefact("index", format!("{id}/{attempt}"), true));
         Ok(outcome.on_complete(move |connection| {
@@ -122,7 +121,7 @@ async fn sql_of_the_handler_is_committed_with_the_completion_or_not_at_all() {
             })
         }))
     });
-    let (run_id, ids) = queue.run(&[ChildJob::new("build", json!(null))]).await;
+    let (run_id, ids) = queue.run(&[job(Build, json!(null))]).await;
     let _worker = queue.worker().handler(handler).start(CancellationToken::new());
     queue.wait_for_run(run_id, RunState::Succeeded).await;
     let rows: Vec<(i64, i32)> =
@@ -137,11 +136,11 @@ async fn sql_of_the_handler_is_committed_with_the_completion_or_not_at_all() {
 #[tokio::test]
 async fn an_outcome_that_the_database_refuses_is_a_failed_attempt() {
     let queue = Queue::new().await;
-    let handler = does("build", async |_| {
+    let handler = does(Build, async |_| {
         let bad = Artefact { blake3: "not a hash".into(), ..artefact("index", "key".into(), false) };
         Ok(Outcome::default().artefact(bad))
     });
-    let (run_id, _) = queue.run(&[ChildJob::new("build", json!(null)).max_attempts(1)]).await;
+    let (run_id, _) = queue.run(&[job(Build, json!(null)).max_attempts(1)]).await;
     let _worker = queue.worker().handler(handler).start(CancellationToken::new());
     let status = queue.wait_for_run(run_id, RunState::Failed).await;
     assert!(status.error_detail.unwrap().contains("artefacts_blake3_check"));
@@ -150,8 +149,8 @@ async fn an_outcome_that_the_database_refuses_is_a_failed_attempt() {
 #[tokio::test]
 async fn depth_counts_unfinished_jobs_by_kind_and_state() {
     let queue = Queue::new().await;
-    let merge = ChildJob::new("merge", json!(null)).depends_on([0]);
-    queue.run(&[jobs("chunk", 2), vec![merge]].concat()).await;
+    let merge = job(Merge, json!(null)).depends_on([0]);
+    queue.run(&[jobs(Chunk, 2), vec![merge]].concat()).await;
     queue.claim("chunk", 1).await;
     let mut connection = queue.pool.acquire().await.unwrap();
     let depth = queue::depth(&mut connection).await.unwrap();

@@ -5,7 +5,7 @@ use std::time::Duration;
 use queue::{Beat, BeatAnswer, ClaimedJob, Completion, Failure, Lease, LeaseNumber, RetryPolicy, Settled};
 use tokio_util::sync::CancellationToken;
 
-use crate::support::{Queue, does, jobs};
+use crate::support::{Chunk, Merge, Queue, does, jobs};
 
 pub fn lease(job: &ClaimedJob) -> Lease {
     Lease { job_id: job.id, run_id: job.run_id, lease_number: job.lease_number }
@@ -30,7 +30,7 @@ async fn lose_lease(queue: &Queue, job: &ClaimedJob) {
 async fn two_workers_claim_one_row_and_one_gets_it() {
     let queue = Queue::new().await;
     for _ in 0..20 {
-        queue.run(&jobs("chunk", 1)).await;
+        queue.run(&jobs(Chunk, 1)).await;
         let (one, other) = tokio::join!(queue.claim("chunk", 1), queue.claim("chunk", 1));
         assert_eq!(one.len() + other.len(), 1);
     }
@@ -39,7 +39,7 @@ async fn two_workers_claim_one_row_and_one_gets_it() {
 #[tokio::test]
 async fn a_claim_takes_only_its_kinds_and_starts_the_run() {
     let queue = Queue::new().await;
-    let (run_id, _) = queue.run(&jobs("merge", 2)).await;
+    let (run_id, _) = queue.run(&jobs(Merge, 2)).await;
     assert!(queue.claim("chunk", 9).await.is_empty());
     assert_eq!(queue.status(run_id).await.state, queue::RunState::Queued);
     assert_eq!(queue.claim("merge", 1).await.len(), 1);
@@ -49,7 +49,7 @@ async fn a_claim_takes_only_its_kinds_and_starts_the_run() {
 #[tokio::test]
 async fn a_late_completion_after_a_lost_lease_is_dropped() {
     let queue = Queue::new().await;
-    let (run_id, _) = queue.run(&jobs("chunk", 1)).await;
+    let (run_id, _) = queue.run(&jobs(Chunk, 1)).await;
     let late = queue.claim("chunk", 1).await.remove(0);
     lose_lease(&queue, &late).await;
     let current = queue.claim("chunk", 1).await.remove(0);
@@ -57,7 +57,7 @@ async fn a_late_completion_after_a_lost_lease_is_dropped() {
     assert!(current.lease_number > late.lease_number);
 
     let mut connection = queue.pool.acquire().await.unwrap();
-    let completion = Completion { children: &jobs("merge", 1), ..Completion::default() };
+    let completion = Completion { children: &jobs(Merge, 1), ..Completion::default() };
     let settled = queue::complete(&mut connection, &lease(&late), &completion).await.unwrap();
     assert_eq!(settled, Settled::LeaseLost);
     let failure = Failure::GiveUp { message: "bad".into(), detail: String::new() };
@@ -74,9 +74,9 @@ async fn a_late_completion_after_a_lost_lease_is_dropped() {
 #[tokio::test]
 async fn completing_twice_says_succeeded_both_times_and_stores_once() {
     let queue = Queue::new().await;
-    queue.run(&jobs("chunk", 2)).await;
+    queue.run(&jobs(Chunk, 2)).await;
     let job = queue.claim("chunk", 1).await.remove(0);
-    let children = jobs("merge", 3);
+    let children = jobs(Merge, 3);
     let completion = Completion { children: &children, ..Completion::default() };
     let mut connection = queue.pool.acquire().await.unwrap();
     for _ in 0..2 {
@@ -89,8 +89,8 @@ async fn completing_twice_says_succeeded_both_times_and_stores_once() {
 #[tokio::test]
 async fn a_heartbeat_tells_held_lost_and_cancelled_leases_apart_in_one_answer() {
     let queue = Queue::new().await;
-    let (_, _) = queue.run(&jobs("chunk", 1)).await;
-    let (cancelled_run, _) = queue.run(&jobs("chunk", 1)).await;
+    let (_, _) = queue.run(&jobs(Chunk, 1)).await;
+    let (cancelled_run, _) = queue.run(&jobs(Chunk, 1)).await;
     let claimed = queue.claim("chunk", 2).await;
     let (held, cancelled) = (&claimed[0], &claimed[1]);
     queue.cancel(cancelled_run).await;
@@ -104,7 +104,7 @@ async fn a_heartbeat_tells_held_lost_and_cancelled_leases_apart_in_one_answer() 
 #[tokio::test]
 async fn a_heartbeat_does_not_wait_for_a_locked_job() {
     let queue = Queue::new().await;
-    queue.run(&jobs("chunk", 2)).await;
+    queue.run(&jobs(Chunk, 2)).await;
     let claimed = queue.claim("chunk", 2).await;
     let mut holder = queue.pool.begin().await.unwrap();
     sqlx::query("SELECT FROM jobs WHERE id = $1 FOR UPDATE")
@@ -121,9 +121,9 @@ async fn a_heartbeat_does_not_wait_for_a_locked_job() {
 async fn a_worker_whose_lease_was_lost_stops_the_handler_and_drops_its_result() {
     let queue = Queue::new().await;
     queue.set_staleness(Duration::from_millis(500)).await;
-    let (_, ids) = queue.run(&jobs("chunk", 1)).await;
+    let (_, ids) = queue.run(&jobs(Chunk, 1)).await;
     let (stopped, mut was_stopped) = tokio::sync::mpsc::channel(1);
-    let handler = does("chunk", move |job| {
+    let handler = does(Chunk, move |job| {
         let stopped = stopped.clone();
         async move {
             job.cancelled().await;
@@ -147,7 +147,7 @@ async fn a_worker_whose_lease_was_lost_stops_the_handler_and_drops_its_result() 
 #[tokio::test]
 async fn handing_back_costs_no_attempt_but_raises_the_lease_number() {
     let queue = Queue::new().await;
-    queue.run(&jobs("chunk", 1)).await;
+    queue.run(&jobs(Chunk, 1)).await;
     let mut connection = queue.pool.acquire().await.unwrap();
     for round in 1..=10 {
         let job = queue.claim("chunk", 1).await.remove(0);

@@ -4,18 +4,18 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use queue::{ChildJob, JobContext, JobId, Outcome, RunState};
+use queue::{JobContext, JobId, Outcome, RunState};
 use serde_json::json;
 use testkit::postgres::TestDatabase;
 use tokio_util::sync::CancellationToken;
 
-use crate::support::{Does, Queue, does, jobs};
+use crate::support::{Chunk, Does, Queue, does, job, jobs};
 
 type Counts = Arc<Mutex<HashMap<JobId, usize>>>;
 
-fn counting(counts: &Counts) -> Does {
+fn counting(counts: &Counts) -> Does<Chunk> {
     let counts = counts.clone();
-    does("chunk", move |job: JobContext| {
+    does(Chunk, move |job: JobContext| {
         *counts.lock().unwrap().entry(job.id()).or_default() += 1;
         async { Ok(Outcome::default()) }
     })
@@ -26,7 +26,7 @@ async fn ten_thousand_jobs_and_sixteen_workers_do_each_job_exactly_once() {
     let queue = Queue::new().await;
     let mut runs = Vec::new();
     for _ in 0..20 {
-        runs.push(queue.run(&jobs("chunk", 500)).await.0);
+        runs.push(queue.run(&jobs(Chunk, 500)).await.0);
     }
     let counts = Counts::default();
     let shutdown = CancellationToken::new();
@@ -50,15 +50,15 @@ async fn ten_thousand_jobs_and_sixteen_workers_do_each_job_exactly_once() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_database_that_crashes_under_load_loses_no_job_and_no_worker() {
     let queue = Queue::on(TestDatabase::in_own_cluster().await.unwrap());
-    let handler = does("chunk", async |job| {
+    let handler = does(Chunk, async |job| {
         for step in 0..10 {
             job.progress(f64::from(step) / 10.0, "working");
             tokio::time::sleep(Duration::from_millis(2)).await;
         }
         Ok(Outcome::default())
     });
-    let mut chunks: Vec<_> = jobs("chunk", 600).into_iter().map(|job| job.max_attempts(10)).collect();
-    chunks.push(ChildJob::new("chunk", json!(null)).depends_on(0..600));
+    let mut chunks: Vec<_> = jobs(Chunk, 600).into_iter().map(|job| job.max_attempts(10)).collect();
+    chunks.push(job(Chunk, json!(null)).depends_on(0..600));
     let (run_id, _) = queue.run(&chunks).await;
     let shutdown = CancellationToken::new();
     let workers: Vec<_> = (0..3)

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use queue::{ChildJob, Completion, NewJob, Settled};
+use queue::{Completion, NewJob, Settled};
 use serde_json::json;
 
 use crate::leases::lease;
-use crate::support::{DEADLINE, Queue, jobs, new_run};
+use crate::support::{Chunk, DEADLINE, Late, Merge, Queue, job, jobs, new_run};
 
 /// What must not wait for a lock gets this long.
 const AT_ONCE: Duration = Duration::from_secs(5);
@@ -14,24 +14,27 @@ const AT_ONCE: Duration = Duration::from_secs(5);
 #[tokio::test]
 async fn an_open_transaction_that_has_enqueued_keeps_nobody_waiting() {
     let queue = Queue::new().await;
-    let (run_id, ids) = queue.run(&jobs("chunk", 4)).await;
+    let (run_id, ids) = queue.run(&jobs(Chunk, 4)).await;
     let mut open = queue.pool.begin().await.unwrap();
     let other_run = queue::enqueue_run(&mut open, &new_run(queue.project)).await.unwrap();
-    queue::enqueue_many(&mut open, other_run, &jobs("chunk", 3)).await.unwrap();
+    queue::enqueue_many(&mut open, other_run, &jobs(Chunk, 3)).await.unwrap();
     // Into a run that others use as well, and depending on jobs that are being claimed.
-    queue::enqueue(&mut open, &NewJob::new(run_id, "chunk", json!(0))).await.unwrap();
-    queue::enqueue(&mut open, &NewJob { depends_on: &ids, ..NewJob::new(run_id, "merge", json!(1)) })
+    queue::enqueue(&mut open, &NewJob::new(run_id, &Chunk(json!(0))).unwrap()).await.unwrap();
+    queue::enqueue(&mut open, &NewJob { depends_on: &ids, ..NewJob::new(run_id, &Merge(json!(1))).unwrap() })
         .await
         .unwrap();
 
     tokio::time::timeout(AT_ONCE, async {
         let mut second = queue.pool.begin().await.unwrap();
-        queue::enqueue(&mut second, &NewJob::new(run_id, "chunk", json!(2))).await.unwrap();
-        queue::enqueue(&mut second, &NewJob { depends_on: &ids, ..NewJob::new(run_id, "merge", json!(3)) })
-            .await
-            .unwrap();
+        queue::enqueue(&mut second, &NewJob::new(run_id, &Chunk(json!(2))).unwrap()).await.unwrap();
+        queue::enqueue(
+            &mut second,
+            &NewJob { depends_on: &ids, ..NewJob::new(run_id, &Merge(json!(3))).unwrap() },
+        )
+        .await
+        .unwrap();
         second.commit().await.unwrap();
-        queue.run(&jobs("chunk", 1)).await;
+        queue.run(&jobs(Chunk, 1)).await;
 
         let claimed = queue.claim("chunk", 99).await;
         assert_eq!(claimed.len(), 6, "what is committed can be claimed");
@@ -59,10 +62,10 @@ async fn an_open_transaction_that_has_enqueued_keeps_nobody_waiting() {
 #[tokio::test]
 async fn jobs_complete_while_a_job_is_being_added_to_their_run_but_the_run_does_not_end() {
     let queue = Queue::new().await;
-    let (run_id, _) = queue.run(&jobs("chunk", 2)).await;
+    let (run_id, _) = queue.run(&jobs(Chunk, 2)).await;
     let claimed = queue.claim("chunk", 2).await;
     let mut open = queue.pool.begin().await.unwrap();
-    queue::enqueue(&mut open, &NewJob::new(run_id, "late", json!(0))).await.unwrap();
+    queue::enqueue(&mut open, &NewJob::new(run_id, &Late(json!(0))).unwrap()).await.unwrap();
 
     let mut connection = queue.pool.acquire().await.unwrap();
     let (first, completion) = (lease(&claimed[0]), Completion::default());
@@ -89,8 +92,8 @@ async fn jobs_complete_while_a_job_is_being_added_to_their_run_but_the_run_does_
 async fn the_last_two_jobs_of_a_run_may_complete_at_once() {
     let queue = Queue::new().await;
     for _ in 0..30 {
-        let merge = ChildJob::new("merge", json!(null)).depends_on([0, 1]);
-        let (run_id, _) = queue.run(&[jobs("chunk", 2), vec![merge]].concat()).await;
+        let merge = job(Merge, json!(null)).depends_on([0, 1]);
+        let (run_id, _) = queue.run(&[jobs(Chunk, 2), vec![merge]].concat()).await;
         let claimed = queue.claim("chunk", 2).await;
         let complete = async |job| {
             let mut connection = queue.pool.acquire().await.unwrap();

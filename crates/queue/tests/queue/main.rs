@@ -7,6 +7,7 @@ mod leases;
 mod load;
 mod locks;
 mod order;
+mod payloads;
 mod shutdown;
 mod states;
 mod support;

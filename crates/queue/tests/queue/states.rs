@@ -2,7 +2,7 @@
 
 use sqlx::Error;
 
-use crate::support::{Queue, jobs};
+use crate::support::{Chunk, Queue, jobs};
 
 /// The constraint that refused the statement.
 async fn refused_by(queue: &Queue, statement: &str) -> String {
@@ -15,7 +15,7 @@ async fn refused_by(queue: &Queue, statement: &str) -> String {
 #[tokio::test]
 async fn illegal_rows_are_refused_by_name() {
     let queue = Queue::new().await;
-    queue.run(&jobs("chunk", 1)).await;
+    queue.run(&jobs(Chunk, 1)).await;
     let refusals = [
         ("state = 'resting'", "jobs_state_check"),
         ("state = 'running', lease_number = 1, attempts = 1, started_at = now()", "jobs_running_iff_leased"),
@@ -81,7 +81,7 @@ async fn every_step_that_is_not_drawn_is_refused() {
             let mut transaction = queue.pool.begin().await.unwrap();
             let run =
                 queue::enqueue_run(&mut transaction, &crate::support::new_run(queue.project)).await.unwrap();
-            queue::enqueue_many(&mut transaction, run, &jobs("chunk", 1)).await.unwrap();
+            queue::enqueue_many(&mut transaction, run, &jobs(Chunk, 1)).await.unwrap();
             // The way there is not the test's concern.
             for statement in [
                 "ALTER TABLE jobs DISABLE TRIGGER jobs_legal_steps".to_owned(),
@@ -101,7 +101,7 @@ async fn every_step_that_is_not_drawn_is_refused() {
 #[tokio::test]
 async fn only_a_claim_moves_the_lease_number_and_only_by_one() {
     let queue = Queue::new().await;
-    queue.run(&jobs("chunk", 1)).await;
+    queue.run(&jobs(Chunk, 1)).await;
     queue.claim("chunk", 1).await;
     for number in [0, 2, 3] {
         let found = refused_by(&queue, &format!("UPDATE jobs SET lease_number = {number}")).await;
@@ -112,12 +112,12 @@ async fn only_a_claim_moves_the_lease_number_and_only_by_one() {
 #[tokio::test]
 async fn a_run_that_has_ended_stays_as_it_is() {
     let queue = Queue::new().await;
-    let (run_id, _) = queue.run(&jobs("chunk", 1)).await;
+    let (run_id, _) = queue.run(&jobs(Chunk, 1)).await;
     assert_eq!(queue.cancel(run_id).await, queue::RunState::Cancelled);
     assert_eq!(queue.cancel(run_id).await, queue::RunState::Cancelled);
     let change = "UPDATE runs SET state = 'running', finished_at = NULL, started_at = now()";
     assert_eq!(refused_by(&queue, change).await, "runs_legal_steps");
     let mut connection = queue.pool.acquire().await.unwrap();
-    let added = queue::enqueue_many(&mut connection, run_id, &jobs("chunk", 1)).await;
+    let added = queue::enqueue_many(&mut connection, run_id, &jobs(Chunk, 1)).await;
     assert!(matches!(added, Err(queue::Error::RunFinished { .. })), "{added:?}");
 }

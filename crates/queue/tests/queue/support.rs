@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use futures::future::BoxFuture;
 use queue::{
-    ChildJob, ClaimedJob, Handler, JobContext, JobError, JobId, NewRun, Outcome, ProjectId, RetryPolicy,
+    ChildJob, ClaimedJob, Handler, Job, JobContext, JobError, JobId, NewRun, Outcome, ProjectId, RetryPolicy,
     RunId, RunState, RunStatus, Worker, WorkerBuilder,
 };
-use serde_json::json;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use sqlx::{AssertSqlSafe, PgPool};
 use testkit::postgres::TestDatabase;
 use uuid::Uuid;
@@ -114,8 +115,43 @@ pub fn new_run(project_id: ProjectId) -> NewRun<'static> {
     NewRun { project_id, kind: "reconstruction", session_id: None, parameters: json!({ "points": 6 }) }
 }
 
-pub fn jobs(kind: &str, count: usize) -> Vec<ChildJob> {
-    (0..count).map(|index| ChildJob::new(kind, json!(index))).collect()
+/// Kinds of jobs that are given whatever a test likes.
+macro_rules! kinds {
+    ($($name:ident = $kind:literal),+ $(,)?) => {$(
+        #[derive(Clone, Serialize, Deserialize)]
+        #[serde(transparent)]
+        pub struct $name(pub Value);
+
+        impl Job for $name {
+            const KIND: &'static str = $kind;
+        }
+    )+};
+}
+
+kinds! {
+    After = "after",
+    Build = "build",
+    Chunk = "chunk",
+    Cursed = "cursed",
+    Deaf = "deaf",
+    Held = "held",
+    Hopeless = "hopeless",
+    Late = "late",
+    Merge = "merge",
+    Nothing = "nothing",
+    Other = "other",
+    Patient = "patient",
+    Plan = "plan",
+    Poison = "poison",
+    Told = "told",
+}
+
+pub fn job<J: Job>(kind: fn(Value) -> J, payload: Value) -> ChildJob {
+    ChildJob::new(&kind(payload)).unwrap()
+}
+
+pub fn jobs<J: Job>(kind: fn(Value) -> J, count: usize) -> Vec<ChildJob> {
+    (0..count).map(|index| job(kind, json!(index))).collect()
 }
 
 /// Looks again and again, for what no barrier tells.
@@ -134,33 +170,46 @@ pub async fn wait_until<T>(what: &str, look: impl AsyncFn() -> Option<T>) -> T {
     }
 }
 
-type Work = dyn Fn(JobContext) -> BoxFuture<'static, Result<Outcome, JobError>> + Send + Sync;
+type Work<J> = dyn Fn(JobContext, J) -> BoxFuture<'static, Result<Outcome, JobError>> + Send + Sync;
 
 /// A handler from a closure.
-#[derive(Clone)]
-pub struct Does {
-    kind: &'static str,
-    work: Arc<Work>,
+pub struct Does<J> {
+    work: Arc<Work<J>>,
 }
 
-pub fn does<F>(kind: &'static str, work: impl Fn(JobContext) -> F + Send + Sync + 'static) -> Does
+impl<J> Clone for Does<J> {
+    fn clone(&self) -> Self {
+        Self { work: self.work.clone() }
+    }
+}
+
+/// A handler that looks at what it is given.
+pub fn reads<J: Job, F>(work: impl Fn(JobContext, J) -> F + Send + Sync + 'static) -> Does<J>
 where
     F: Future<Output = Result<Outcome, JobError>> + Send + 'static,
 {
-    Does { kind, work: Arc::new(move |job| Box::pin(work(job))) }
+    Does { work: Arc::new(move |context, job| Box::pin(work(context, job))) }
 }
 
-impl Handler for Does {
-    fn kind(&self) -> &'static str {
-        self.kind
-    }
+pub fn does<J: Job, F>(
+    _kind: fn(Value) -> J,
+    work: impl Fn(JobContext) -> F + Send + Sync + 'static,
+) -> Does<J>
+where
+    F: Future<Output = Result<Outcome, JobError>> + Send + 'static,
+{
+    reads(move |context, _| work(context))
+}
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        (self.work)(job).await
+impl<J: Job> Handler for Does<J> {
+    type Job = J;
+
+    async fn run(&self, context: JobContext, job: J) -> Result<Outcome, JobError> {
+        (self.work)(context, job).await
     }
 }
 
 /// A handler that has nothing to do.
-pub fn succeeds(kind: &'static str) -> Does {
+pub fn succeeds<J: Job>(kind: fn(Value) -> J) -> Does<J> {
     does(kind, async |_| Ok(Outcome::default()))
 }

@@ -1,8 +1,7 @@
 //! Building body models.
 
 use axum::extract::State;
-use jobs::{BUILD_BODY_MODEL, BodyModelName, BuildBodyModel};
-use queue::{NewRun, ProjectId};
+use jobs::body_model::{self, BodyModelName, BuildBodyModel};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -84,13 +83,7 @@ pub(super) async fn build(
         components,
         metres_per_unit: body.metres_per_unit,
     };
-    let new = NewRun {
-        project_id: ProjectId(project_id),
-        kind: "body-model",
-        session_id: None,
-        parameters: serde_json::to_value(&payload)?,
-    };
-    let run_id = start(&mut tx, &new, BUILD_BODY_MODEL).await?;
+    let run_id = start(&mut tx, project_id, body_model::RUN_KIND, None, &payload).await?;
     sqlx::query("UPDATE body_models SET build_run_id = $2 WHERE id = $1")
         .bind(model.id)
         .bind(run_id)

@@ -3,7 +3,7 @@
 use axum::{Json, extract::State, http::StatusCode};
 use body::shipped;
 use chrono::{DateTime, Utc};
-use jobs::{BodyModelFile, SHIPPED};
+use jobs::body_model::{BodyModelFile, SHIPPED};
 use queue::RunId;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};

@@ -1,8 +1,7 @@
 //! Building motion databases, and training models on them.
 
 use axum::extract::State;
-use jobs::{MotionDatabaseName, PLAN_MOTION_DATABASE, PlanMotionDatabase, TRAIN_GPLVM, TrainGplvm};
-use queue::{NewRun, ProjectId};
+use jobs::motion_database::{self, MotionDatabaseName, PlanMotionDatabase, TrainGplvm};
 use regression::gplvm::TrainingOptions;
 use serde::Deserialize;
 use serde_json::{Map, Value};
@@ -48,7 +47,7 @@ impl NewBuild {
     fn check(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::Unprocessable(what));
         if let Some(augment) = &self.augment {
-            jobs::Augment::from(augment.clone())
+            motion_database::Augment::from(augment.clone())
                 .check()
                 .map_err(|error| Error::Unprocessable(error.to_string()))?;
         }
@@ -110,13 +109,7 @@ pub(super) async fn build(
         )));
     }
     let payload = plan(&mut tx, project_id, &database, &body).await?;
-    let new = NewRun {
-        project_id: ProjectId(project_id),
-        kind: "motion-database",
-        session_id: None,
-        parameters: serde_json::to_value(&payload)?,
-    };
-    let run_id = start(&mut tx, &new, PLAN_MOTION_DATABASE).await?;
+    let run_id = start(&mut tx, project_id, motion_database::RUN_KIND, None, &payload).await?;
     uses(&mut tx, run_id, database.base_id).await?;
     sqlx::query("UPDATE motion_databases SET build_run_id = $2 WHERE id = $1")
         .bind(database.id)
@@ -186,7 +179,7 @@ pub(crate) struct NewTraining {
 
 impl NewTraining {
     /// All parameters, those left out with their defaults.
-    fn resolve(&self) -> Result<Value> {
+    fn resolve(&self) -> Result<TrainingOptions> {
         let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
         if let Some(method) = self.method.as_ref().filter(|method| *method != "gplvm") {
             return Err(Error::Unprocessable(format!(
@@ -196,7 +189,7 @@ impl NewTraining {
         let given = Value::Object(self.parameters.clone());
         let options: TrainingOptions = serde_json::from_value(given).map_err(|error| refuse(&error))?;
         options.check().map_err(|error| refuse(&error))?;
-        Ok(serde_json::to_value(options)?)
+        Ok(options)
     }
 }
 
@@ -226,13 +219,7 @@ pub(super) async fn train(
     }
     let database = lookup::motion_database(&mut tx, project_id, &which, Latest::Ready, Lock::Share).await?;
     let payload = TrainGplvm { motion_database: database.ready()?, parameters };
-    let new = NewRun {
-        project_id: ProjectId(project_id),
-        kind: "training",
-        session_id: None,
-        parameters: serde_json::to_value(&payload)?,
-    };
-    let run_id = start(&mut tx, &new, TRAIN_GPLVM).await?;
+    let run_id = start(&mut tx, project_id, motion_database::TRAINING_RUN_KIND, None, &payload).await?;
     uses(&mut tx, run_id, Some(database.id)).await?;
     let run = runs::find(&mut tx, project_id, run_id).await?;
     let answer = Answer::accepted(format!("/v1/runs/{run_id}"), &run)?;

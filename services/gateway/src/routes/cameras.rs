@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use ::multi_view::Parameters;
+use formats::FileRole;
 use jobs::{
-    InputFile, InverseKinematics, PLAN_MULTI_VIEW, PlanMultiView, SHIPPED, SOLVE_INVERSE_KINEMATICS,
-    SolveInverseKinematics,
+    InputFile,
+    body_model::SHIPPED,
+    inverse_kinematics::{self, InverseKinematics, SolveInverseKinematics},
+    multi_view::{self, PlanMultiView},
 };
-use multi_view::Parameters;
-use queue::{NewRun, ProjectId};
 use serde_json::{Map, Value};
 use sqlx::PgConnection;
 use uuid::Uuid;
@@ -20,7 +22,7 @@ use super::{
 use crate::error::{Error, Result};
 
 /// Kind of runs by inverse kinematics.
-pub(super) const INVERSE_KINEMATICS: &str = "inverse-kinematics";
+pub(super) const INVERSE_KINEMATICS: &str = inverse_kinematics::RUN_KIND;
 /// Most files that a request names the cameras of.
 const MAX_NAMES: usize = 256;
 /// Units of calibrations, metres.
@@ -94,7 +96,6 @@ impl NewMultiView {
         }
         let which = request.body_model.as_deref().unwrap_or(SHIPPED);
         let model = body_models::find(db, project_id, which, Latest::Ready, Lock::Share).await?;
-        let up = up.map(serde_json::to_value).transpose()?;
         let plan = PlanMultiView {
             session_id: session.id,
             session_name: session.name.clone(),
@@ -102,19 +103,13 @@ impl NewMultiView {
             files,
             cameras: request.cameras,
             camera_files: request.camera_files,
-            up: up.as_ref().and_then(Value::as_str).map(str::to_owned),
+            up,
             metres_per_unit: request.metres_per_unit,
             parameters,
             inverse_kinematics,
         };
-        let kind = if plan.inverse_kinematics.is_some() { INVERSE_KINEMATICS } else { "multi-view" };
-        let new = NewRun {
-            project_id: ProjectId(project_id),
-            kind,
-            session_id: Some(session.id),
-            parameters: serde_json::to_value(&plan)?,
-        };
-        let run_id = start(db, &new, PLAN_MULTI_VIEW).await?;
+        let kind = if plan.inverse_kinematics.is_some() { INVERSE_KINEMATICS } else { multi_view::RUN_KIND };
+        let run_id = start(db, project_id, kind, Some(session.id), &plan).await?;
         body_models::uses(db, run_id, Some(model.id).filter(|id| !id.is_nil())).await?;
         Ok(run_id)
     }
@@ -174,31 +169,24 @@ async fn start_blind(
     }
     let which = request.body_model.as_deref().unwrap_or(SHIPPED);
     let model = body_models::find(db, project_id, which, Latest::Ready, Lock::Share).await?;
-    let up = asked.up.map(serde_json::to_value).transpose()?;
     let solve = SolveInverseKinematics {
         session_id: session.id,
         session_name: session.name.clone(),
         body_model: model.ready()?,
         files,
-        up: up.as_ref().and_then(Value::as_str).map(str::to_owned),
+        up: asked.up,
         how: asked.inverse_kinematics.unwrap_or_default(),
         cameras: None,
     };
-    let new = NewRun {
-        project_id: ProjectId(project_id),
-        kind: INVERSE_KINEMATICS,
-        session_id: Some(session.id),
-        parameters: serde_json::to_value(&solve)?,
-    };
-    let run_id = start(db, &new, SOLVE_INVERSE_KINEMATICS).await?;
+    let run_id = start(db, project_id, INVERSE_KINEMATICS, Some(session.id), &solve).await?;
     body_models::uses(db, run_id, Some(model.id).filter(|id| !id.is_nil())).await?;
     Ok(run_id)
 }
 
 /// A calibration, and something that cameras saw.
 fn check_files(files: &[InputFile]) -> Result<()> {
-    let count = |role: &str| files.iter().filter(|file| file.role == role).count();
-    match count("calibration") {
+    let count = |role: FileRole| files.iter().filter(|file| file.role == role).count();
+    match count(FileRole::Calibration) {
         1 => {}
         0 => {
             return Err(Error::Unprocessable(
@@ -211,7 +199,7 @@ fn check_files(files: &[InputFile]) -> Result<()> {
             )));
         }
     }
-    if ["video", "images", "masks"].iter().all(|role| count(role) == 0) {
+    if [FileRole::Video, FileRole::Images, FileRole::Masks].into_iter().all(|role| count(role) == 0) {
         return Err(Error::Unprocessable(
             "the session has no video, images or masks; upload what the cameras saw first".into(),
         ));

@@ -74,14 +74,14 @@ pub(crate) struct Augment {
     warps: Vec<f64>,
 }
 
-impl From<Augment> for jobs::Augment {
+impl From<Augment> for jobs::motion_database::Augment {
     fn from(Augment { mirror, warps }: Augment) -> Self {
         Self { mirror, warps }
     }
 }
 
-impl From<jobs::Augment> for Augment {
-    fn from(jobs::Augment { mirror, warps }: jobs::Augment) -> Self {
+impl From<jobs::motion_database::Augment> for Augment {
+    fn from(jobs::motion_database::Augment { mirror, warps }: jobs::motion_database::Augment) -> Self {
         Self { mirror, warps }
     }
 }

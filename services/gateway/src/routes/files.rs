@@ -2,10 +2,11 @@
 
 use axum::{Json, body::Body, http::StatusCode};
 use chrono::{DateTime, Utc};
+use formats::FileRole;
 use serde::Serialize;
 use sqlx::PgConnection;
 use store::{Key, Stored};
-use utoipa::ToSchema;
+use utoipa::{ToSchema, openapi};
 use uuid::Uuid;
 
 use super::{
@@ -15,7 +16,7 @@ use super::{
 use crate::{
     App,
     error::{Error, Result},
-    names::{self, FileRole},
+    names,
     upload::{self, Announced, uninterrupted},
 };
 
@@ -27,8 +28,9 @@ pub(crate) struct File {
     pub name: String,
     /// `skeleton`, `control-points`, `ground-truth`, `calibration`, `video`, `images`, `masks` or `plate`; `motion` or
     /// `scans` where databases and body models are built from it
-    #[schema(example = "control-points")]
-    pub role: String,
+    #[schema(schema_with = role_schema)]
+    #[sqlx(try_from = "String")]
+    pub role: FileRole,
     /// media type by which it is given back
     pub media_type: String,
     /// size, bytes
@@ -39,6 +41,16 @@ pub(crate) struct File {
     pub uploaded_at: DateTime<Utc>,
     #[serde(skip)]
     pub store_key: String,
+}
+
+/// The words of [`FileRole`].
+pub(super) fn role_schema() -> openapi::Object {
+    let words = FileRole::ALL.map(FileRole::as_str);
+    openapi::ObjectBuilder::new()
+        .schema_type(openapi::Type::String)
+        .enum_values(Some(words))
+        .examples([FileRole::ControlPoints.as_str()])
+        .build()
 }
 
 /// All files of a session or of a motion database, by name.

@@ -1,6 +1,10 @@
 //! Starting runs by inverse kinematics.
 
-use jobs::{BodyDescription, IkSolver, InputFile, InverseKinematics};
+use formats::FileRole;
+use jobs::{
+    InputFile,
+    inverse_kinematics::{BodyDescription, IkSolver, InverseKinematics},
+};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -47,8 +51,9 @@ impl InverseKinematicsRequest {
     /// Everything resolved, but for points and markers.
     pub fn resolve(&self, files: &[InputFile]) -> Result<InverseKinematics> {
         let refuse = |what: String| Err(Error::Unprocessable(what));
-        let has = |roles: &[&str]| files.iter().any(|file| roles.contains(&file.role.as_str()));
-        let has_cameras = has(&["calibration"]) && has(&["video", "images", "masks"]);
+        let has = |roles: &[FileRole]| files.iter().any(|file| roles.contains(&file.role));
+        let has_cameras =
+            has(&[FileRole::Calibration]) && has(&[FileRole::Video, FileRole::Images, FileRole::Masks]);
         let solver = match self.solver.as_deref() {
             None if has_cameras => IkSolver::ImageConstrained,
             None => IkSolver::Priority,
@@ -75,7 +80,7 @@ impl InverseKinematicsRequest {
         if let Some(sex) = self.sex.as_deref().filter(|sex| !["female", "male"].contains(sex)) {
             return refuse(format!("sex is {sex:?}, expected female or male"));
         }
-        if !has(&["control-points"]) {
+        if !has(&[FileRole::ControlPoints]) {
             return refuse(
                 "the session has no measured points; upload a .csv, .trc or .c3d file first".into(),
             );

@@ -58,7 +58,8 @@ impl Chosen {
     /// # Errors
     /// If one is not known or out of range.
     pub fn parameters(&self, given: Map<String, Value>, has_own_skeleton: bool) -> Result<String> {
-        Ok(start::resolve_parameters(given, has_own_skeleton)?.to_string())
+        let parameters = start::resolve_parameters(given, has_own_skeleton)?;
+        Ok(serde_json::to_value(parameters)?.to_string())
     }
 }
 

@@ -1,7 +1,7 @@
 //! Finding what a request names, in the caller's project only: what another project has is not there.
 
 use chrono::{DateTime, Utc};
-use jobs::MotionDatabaseFile;
+use jobs::motion_database::MotionDatabaseFile;
 use serde::Serialize;
 use sqlx::PgConnection;
 use utoipa::ToSchema;

@@ -7,6 +7,7 @@ use axum::{
     http::{HeaderMap, StatusCode},
     response::Response,
 };
+use formats::FileRole;
 use serde::Deserialize;
 use utoipa::IntoParams;
 use uuid::Uuid;
@@ -21,7 +22,7 @@ use crate::{
     access::{Reader, Writer},
     error::{Error, Result},
     extract::{Path, Query},
-    names::{self, FileRole},
+    names,
     upload::Announced,
 };
 
@@ -33,6 +34,7 @@ pub(crate) struct PutQuery {
     /// guessed from the name when left out: `.asf` skeleton; `.csv`, `.trc`, `.c3d` control points; `.amc`, `.bvh`
     /// ground truth; `.toml`, `.json`, `.yml`, `.xml`, `.qca.txt` calibration; `.mp4`, `.mov`, `.avi`, `.mkv`, `.webm` video;
     /// `.png`, `.jpg` plate; archives masks, or images or plates if their name says so
+    #[param(schema_with = files::role_schema)]
     role: Option<FileRole>,
 }
 
@@ -74,7 +76,7 @@ pub(super) async fn put_in_session(
     body: Body,
 ) -> Result<(StatusCode, Json<File>)> {
     names::check_file_name(&name)?;
-    let role = query.role.or_else(|| FileRole::of_session_file(&name)).ok_or_else(|| {
+    let role = query.role.or_else(|| FileRole::from_session_file(&name)).ok_or_else(|| {
         Error::Unprocessable(format!(
             "the role of {name:?} can't be told from its name; give it: --role in `marey upload`, ?role= in a request"
         ))

@@ -6,6 +6,7 @@ use axum::{
     extract::State,
     http::{HeaderMap, StatusCode},
 };
+use formats::FileRole;
 use uuid::Uuid;
 
 use super::{
@@ -18,7 +19,7 @@ use crate::{
     access::{Reader, Writer},
     error::{Error, Result},
     extract::Path,
-    names::{self, FileRole},
+    names,
     upload::Announced,
 };
 

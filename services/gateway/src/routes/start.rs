@@ -3,8 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use axum::extract::State;
-use jobs::{InputFile, InverseKinematics};
-use queue::{NewJob, NewRun, ProjectId};
+use formats::FileRole;
+use jobs::{
+    InputFile,
+    inverse_kinematics::InverseKinematics,
+    sparse::{self, PlanSparse},
+};
+use queue::{Job, NewJob, NewRun, ProjectId};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 use sqlx::PgConnection;
@@ -25,7 +30,6 @@ use crate::{
     answer::Answer,
     error::{Error, Result},
     extract::{Path, Posted},
-    jobs::{PLAN_SPARSE, PlanSparse},
 };
 
 /// Most names in a mapping.
@@ -112,7 +116,7 @@ pub(crate) struct NewReconstruction {
 impl NewReconstruction {
     /// Whether it is for cameras: as it says, or else as the session's files are.
     fn is_for_cameras(&self, files: &[InputFile]) -> Result<bool> {
-        let has = |role: &str| files.iter().any(|file| file.role == role);
+        let has = |role: FileRole| files.iter().any(|file| file.role == role);
         match self.kind.as_deref() {
             Some("sparse") => return Ok(false),
             Some("multi-view") => return Ok(true),
@@ -123,7 +127,7 @@ impl NewReconstruction {
             }
             None => {}
         }
-        match (has("control-points"), has("calibration")) {
+        match (has(FileRole::ControlPoints), has(FileRole::Calibration)) {
             (true, true) => Err(Error::Unprocessable(
                 "the session has control points and cameras; say kind: sparse, multi-view or inverse-kinematics".into(),
             )),
@@ -251,7 +255,7 @@ impl NewReconstruction {
         checked.map_err(|error| Error::Unprocessable(error.to_string()))
     }
 
-    fn resolve(&self, has_own_skeleton: bool) -> Result<Value> {
+    fn resolve(&self, has_own_skeleton: bool) -> Result<::sparse::Parameters> {
         resolve_parameters(self.given()?, has_own_skeleton)
     }
 
@@ -275,17 +279,20 @@ impl NewReconstruction {
 
 /// All parameters of the method, those left out with their defaults. Without a skeleton of the performer's own the
 /// database's is borrowed, and whose clips have one like it says nothing: they are not preferred.
-pub(super) fn resolve_parameters(mut given: Map<String, Value>, has_own_skeleton: bool) -> Result<Value> {
+pub(super) fn resolve_parameters(
+    mut given: Map<String, Value>,
+    has_own_skeleton: bool,
+) -> Result<::sparse::Parameters> {
     let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
     if !has_own_skeleton {
         for name in ["skeleton_weight", "start_skeleton_weight"] {
             given.entry(name).or_insert(Value::from(0.0));
         }
     }
-    let parameters: sparse::Parameters =
+    let parameters: ::sparse::Parameters =
         serde_json::from_value(Value::Object(given)).map_err(|error| refuse(&error))?;
     parameters.check().map_err(|error| refuse(&error))?;
-    Ok(serde_json::to_value(&parameters)?)
+    Ok(parameters)
 }
 
 /// Reconstruct a session
@@ -343,9 +350,9 @@ pub(super) async fn reconstruction(
         return Err(Error::Unprocessable("motion_database is missing: name the one to learn from".into()));
     };
     let database = lookup::motion_database(&mut tx, project_id, which, Latest::Ready, Lock::Share).await?;
-    let parameters = body.resolve(files.iter().any(|file| file.role == "skeleton"))?;
+    let parameters = body.resolve(files.iter().any(|file| file.role == FileRole::Skeleton))?;
     let mut motion_database = database.ready()?;
-    if parameters["method"] == "gplvm" {
+    if parameters.method == ::sparse::Method::Gplvm {
         motion_database.gplvm = Some(contents::gplvm(&mut tx, &database).await?);
     }
     let plan = PlanSparse {
@@ -355,35 +362,37 @@ pub(super) async fn reconstruction(
         files,
         points: body.points,
         mapping: body.mapping,
-        marker_set: body.marker_set.unwrap_or_else(|| "auto".to_owned()),
+        marker_set: Some(body.marker_set.unwrap_or_else(|| "auto".to_owned())),
         marker_map: body.marker_map,
         marker_prefix: body.marker_prefix,
         up: body.up,
         bvh_metres_per_unit,
         parameters,
     };
-    if !plan.files.iter().any(|file| file.role == "control-points") {
+    if !plan.files.iter().any(|file| file.role == FileRole::ControlPoints) {
         return Err(Error::Unprocessable(
             "the session has no control points; upload a .csv, .trc or .c3d file first".into(),
         ));
     }
-    let new = NewRun {
-        project_id: ProjectId(project_id),
-        kind: "reconstruction",
-        session_id: Some(session_id),
-        parameters: serde_json::to_value(&plan)?,
-    };
-    let run_id = start(&mut tx, &new, PLAN_SPARSE).await?;
+    let run_id = start(&mut tx, project_id, sparse::RUN_KIND, Some(session_id), &plan).await?;
     builds::uses(&mut tx, run_id, Some(database.id)).await?;
     let run = runs::find(&mut tx, project_id, run_id).await?;
     let answer = Answer::accepted(format!("/v1/runs/{run_id}"), &run)?;
     request.commit(tx, project_id, answer).await
 }
 
-/// The run and its first job, whose payload is the run's parameters.
-pub(super) async fn start(db: &mut PgConnection, run: &NewRun<'_>, first_job: &str) -> Result<Uuid> {
-    let run_id = queue::enqueue_run(db, run).await?;
-    queue::enqueue(db, &NewJob::new(run_id, first_job, run.parameters.clone())).await?;
+/// The run and its first job, which is given what the run shows as its parameters.
+pub(super) async fn start<J: Job>(
+    db: &mut PgConnection,
+    project_id: Uuid,
+    kind: &str,
+    session_id: Option<Uuid>,
+    first_job: &J,
+) -> Result<Uuid> {
+    let parameters = serde_json::to_value(first_job)?;
+    let run = NewRun { project_id: ProjectId(project_id), kind, session_id, parameters };
+    let run_id = queue::enqueue_run(db, &run).await?;
+    queue::enqueue(db, &NewJob::new(run_id, first_job)?).await?;
     Ok(run_id.0)
 }
 

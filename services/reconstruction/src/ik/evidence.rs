@@ -1,7 +1,7 @@
 //! What was measured of a session, brought to the frames that are solved.
 
-use formats::PointsOptions;
-use jobs::InverseKinematics;
+use formats::{PointsOptions, session};
+use jobs::inverse_kinematics::InverseKinematics;
 use kinematics::{ControlPoint, control_points};
 use model::{Axis, PointTrajectories, Skeleton};
 use nalgebra::Vector3;
@@ -30,8 +30,8 @@ pub(super) fn read(
         how.marker_set.as_deref(),
         how.marker_prefix.as_deref(),
     )?;
-    let reading =
-        crate::Reading { points: PointsOptions { up, ..PointsOptions::default() }, ..Default::default() };
+    let points = PointsOptions { up, ..PointsOptions::default() };
+    let reading = session::Options { points, ..session::Options::default() };
     let (file, trajectories) = inputs::measured_points(files, reading, warnings)?;
     let mut wanted = how.points.clone();
     if wanted.is_empty() && matches!(markers, Markers::Auto | Markers::AsNamed) {

@@ -1,13 +1,18 @@
 //! The job of a run by inverse kinematics: points and silhouettes to the poses of a body.
 
-use std::{sync::Arc, time::Instant};
+use std::sync::Arc;
 
 use body::{BodyModel, Shape};
-use camera_jobs::{CameraClips, Described, Silhouettes, reports};
+use camera_jobs::{Described, Silhouettes, reports};
+use formats::FileRole;
 use inverse_kinematics::{Figure, follow::Solved};
-use jobs::{CameraReport, SOLVE_INVERSE_KINEMATICS, SolveInverseKinematics, frame_rate};
+use jobs::{
+    InputFile,
+    inverse_kinematics::{SolveInverseKinematics, frame_rate},
+    multi_view::{CameraClips, CameraReport},
+};
 use kinematics::ControlPoint;
-use model::{Axis, Motion};
+use model::Motion;
 use nalgebra::Vector3;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
@@ -24,13 +29,7 @@ use crate::{InputError, Shared, export, plan_job, run_report::RUN};
 const FRAME_RATES: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
 pub(crate) struct IkHandler {
-    shared: Arc<Shared>,
-}
-
-impl IkHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
+    pub shared: Arc<Shared>,
 }
 
 /// What is solved.
@@ -46,36 +45,31 @@ struct Problem {
 }
 
 impl Handler for IkHandler {
-    fn kind(&self) -> &'static str {
-        SOLVE_INVERSE_KINEMATICS
-    }
+    type Job = SolveInverseKinematics;
 
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let started = Instant::now();
+    async fn run(&self, context: JobContext, request: SolveInverseKinematics) -> Result<Outcome, JobError> {
         let resources = &self.shared.resources;
-        objects::clean_up_earlier_attempts(&resources.store, &job).await;
-        let request: SolveInverseKinematics = job.payload()?;
         check(&request)?;
-        job.progress(0.0, "reading the session's files");
-        let (cameras, clips) = self.cameras(&job, &request).await?;
+        context.progress(0.0, "reading the session's files");
+        let (cameras, clips) = self.cameras(&context, &request).await?;
         let model = self.shared.models.get(&request.body_model).await?;
         let problem = self.problem(&request, model, &cameras).await?;
-        job.check()?;
+        context.check()?;
 
         let (first, count) = (problem.frames.first, problem.frames.count);
         let silhouettes = Silhouettes::read(resources, &clips, first..first + count).await?;
-        let (of, how) = (job.clone(), request.how.clone());
+        let (watched, how) = (context.clone(), request.how.clone());
         let solved = compute::run(move || -> Result<_, InputError> {
             let Problem { figure, measured, .. } = &problem;
             let mut follower = figure.follower(method(how.solver), how.steps)?;
             let mut solved = Vec::with_capacity(count);
             for (index, measured) in measured.iter().enumerate() {
-                if of.is_cancelled() {
+                if watched.is_cancelled() {
                     break;
                 }
                 let views = silhouettes.views(first + index)?;
                 solved.push(follower.next(&figure.targets(measured), &views)?);
-                of.progress(
+                watched.progress(
                     0.02 + 0.9 * (index + 1) as f64 / count as f64,
                     format!("frame {} of {count}", index + 1),
                 );
@@ -83,14 +77,14 @@ impl Handler for IkHandler {
             Ok((problem, solved))
         });
         let (mut problem, solved) = solved.await?;
-        job.check()?;
+        context.check()?;
         problem.warnings.extend(report::doubts(&solved));
 
-        job.progress(0.95, "writing the motion");
+        context.progress(0.95, "writing the motion");
         let (problem, solved) = (Arc::new(problem), Arc::new(solved));
-        let mut results = self.motion(&job, &problem, &solved).await?;
+        let mut results = self.motion(&context, &problem, &solved).await?;
         let run = Run {
-            id: job.run_id().0,
+            id: context.run_id().0,
             request: &request,
             points: problem.points.iter().map(|point| point.name.as_str()).collect(),
             model: &problem.model,
@@ -99,10 +93,11 @@ impl Handler for IkHandler {
             solved: &solved,
             cameras: &cameras,
             warnings: &problem.warnings,
-            job: &resources.job_report(&job, started, solved.len()),
+            job: &resources.job_report(&context, solved.len()),
         };
         let content = serde_json::to_vec_pretty(&run.report()).map_err(JobError::retry)?;
-        results.push(objects::write_result(&resources.store, &job, RUN, "application/json", content).await?);
+        results
+            .push(objects::write_result(&resources.store, &context, RUN, "application/json", content).await?);
         Ok(results.into_iter().fold(Outcome::default(), Outcome::artefact))
     }
 }
@@ -111,14 +106,14 @@ impl IkHandler {
     /// What the cameras' jobs have left; nothing without cameras.
     async fn cameras(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         request: &SolveInverseKinematics,
     ) -> Result<(Vec<CameraReport>, Vec<CameraClips>), JobError> {
         if request.cameras.is_none() {
             return Ok((Vec::new(), Vec::new()));
         }
         let resources = &self.shared.resources;
-        let artefacts = resources.artefacts_before(job).await?;
+        let artefacts = resources.artefacts_before(context).await?;
         let cameras = reports(resources, &artefacts).await?;
         let clips = cameras.iter().map(|camera| CameraClips::new(camera, &artefacts));
         let clips = clips.collect::<Result<_, _>>()?;
@@ -132,13 +127,13 @@ impl IkHandler {
         cameras: &[CameraReport],
     ) -> Result<Problem, JobError> {
         let resources = &self.shared.resources;
-        let is_wanted = |file: &&jobs::InputFile| file.role == "control-points";
+        let is_wanted = |file: &&InputFile| file.role == FileRole::ControlPoints;
         let files: Vec<_> = request.files.iter().filter(is_wanted).cloned().collect();
         let files = plan_job::fetch(&resources.store, &files, resources.memory.max_object_bytes).await?;
         let (request, limit) = (request.clone(), resources.memory.max_session_frames);
         let mut warnings = request.cameras.as_ref().map_or(Vec::new(), |planned| planned.warnings.clone());
         warnings.extend(cameras.iter().flat_map(|camera| camera.warnings.iter().cloned()));
-        let of_cameras = frame_rate(cameras, &mut warnings);
+        let rate_of_cameras = frame_rate(cameras, &mut warnings);
         let end = cameras.iter().map(|camera| camera.end_frame).min();
         let read = compute::run(move || -> Result<Problem, InputError> {
             let body = &request.how.body;
@@ -151,10 +146,9 @@ impl IkHandler {
             };
             let shape = described.shape(&model)?;
             let skeleton = model.skeleton(&shape)?;
-            let up = axis(request.up.as_deref())?;
-            let chosen = evidence::read(&files, &request.how, up, &skeleton, &mut warnings)?;
+            let chosen = evidence::read(&files, &request.how, request.up, &skeleton, &mut warnings)?;
             let own = chosen.trajectories.frame_rate();
-            let rate = request.how.frame_rate.or(of_cameras).unwrap_or(own);
+            let rate = request.how.frame_rate.or(rate_of_cameras).unwrap_or(own);
             if !FRAME_RATES.contains(&rate) {
                 return Err(out_of_range("frames a second", rate, "1 to 1000"));
             }
@@ -187,16 +181,16 @@ impl IkHandler {
     /// Writes poses and joints.
     async fn motion(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         problem: &Arc<Problem>,
         solved: &Arc<Vec<Solved>>,
     ) -> Result<Vec<Artefact>, JobError> {
         const TEXT: &str = "text/plain; charset=utf-8";
         const CSV: &str = "text/csv; charset=utf-8";
-        let (of, from) = (problem.clone(), solved.clone());
+        let (problem, solved) = (problem.clone(), solved.clone());
         let written = compute::run(move || -> Result<_, InputError> {
-            let Problem { model, shape, figure, frames, measured, .. } = &*of;
-            let poses: Vec<_> = from.iter().map(|solved| figure.pose(solved, None)).collect();
+            let Problem { model, shape, figure, frames, measured, .. } = &*problem;
+            let poses: Vec<_> = solved.iter().map(|solved| figure.pose(solved, None)).collect();
             let motion: Motion = model.motion(shape, &poses, frames.rate)?;
             let count = |points: &Vec<Vector3<f64>>| points.iter().filter(|p| p.x.is_finite()).count();
             let counts: Vec<_> = measured.iter().map(count).collect();
@@ -204,14 +198,14 @@ impl IkHandler {
                 ("motion.bvh", TEXT, formats::bvh::write(&motion)),
                 ("poses.csv", CSV, formats::motion_csv::write(&motion)),
                 ("joints.csv", CSV, export::positions(&motion)),
-                ("quality.csv", CSV, report::quality_csv(&from, &counts, frames.rate)),
+                ("quality.csv", CSV, report::quality_csv(&solved, &counts, frames.rate)),
             ])
         });
         let mut results = Vec::new();
         for (name, media_type, content) in written.await? {
-            job.check()?;
+            context.check()?;
             let store = &self.shared.resources.store;
-            results.push(objects::write_result(store, job, name, media_type, content).await?);
+            results.push(objects::write_result(store, context, name, media_type, content).await?);
         }
         Ok(results)
     }
@@ -223,17 +217,6 @@ fn check(request: &SolveInverseKinematics) -> Result<(), InputError> {
         return Err(out_of_range("steps", steps as f64, "1 to 200"));
     }
     Ok(())
-}
-
-fn axis(up: Option<&str>) -> Result<Option<Axis>, InputError> {
-    let read = |up: &str| {
-        serde_json::from_value(up.into()).map_err(|_| InputError::OutOfRange {
-            field: "up",
-            found: format!("{up:?}"),
-            expected: "x, y or z",
-        })
-    };
-    up.map(read).transpose()
 }
 
 fn out_of_range(field: &'static str, found: f64, expected: &'static str) -> InputError {

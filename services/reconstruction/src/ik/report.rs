@@ -4,7 +4,12 @@ use std::fmt::Write as _;
 
 use body::{BodyModel, Shape};
 use inverse_kinematics::follow::Solved;
-use jobs::{CameraReport, Code, FileReport, JobReport, SolveInverseKinematics};
+use jobs::{
+    JobReport,
+    inverse_kinematics::SolveInverseKinematics,
+    multi_view::CameraReport,
+    run_json::{Code, FileReport},
+};
 use serde_json::{Value, json};
 use uuid::Uuid;
 

@@ -1,15 +1,29 @@
+//! Runs on calibrated cameras: plan, silhouettes a camera, the shape of the person, and following them.
+
+mod silhouettes;
+mod tracking;
+
 use std::collections::BTreeMap;
 
+use model::Axis;
 use multi_view::Parameters;
+use queue::Job;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use crate::{BodyModelFile, InputFile, InverseKinematics};
+pub use silhouettes::{
+    CameraClips, CameraReport, ClipPlace, MakeSilhouettes, Members, Source, SourceKind, StoredClip,
+    clip_name, matches_name, picture_name, report_name,
+};
+pub use tracking::{DrawOverlay, FitShape, MergeTracks, TRACKED, TrackChunk, TrackingSession};
 
-/// Kind of the first job of a run on cameras: [`PlanMultiView`], taken by the shape-init service.
-pub const PLAN_MULTI_VIEW: &str = "plan-multi-view";
+use crate::{InputFile, body_model::BodyModelFile, inverse_kinematics::InverseKinematics};
 
-/// Finds pose and shape of a person in what several calibrated cameras saw.
+/// The kind of such runs.
+pub const RUN_KIND: &str = "multi-view";
+
+/// Reads a session's calibration, finds out whose file is whose, and plans the rest of the run. Taken by the shape-init
+/// service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanMultiView {
     /// The session.
@@ -26,9 +40,9 @@ pub struct PlanMultiView {
     /// File, or `ARCHIVE/FOLDER`, → name of its camera, where names don't tell.
     #[serde(default)]
     pub camera_files: BTreeMap<String, String>,
-    /// Axis of the calibration's world that points up, `x`, `y`, `z`, `-x`, …, where the file doesn't say it.
+    /// Axis of the calibration's world that points up, where the file doesn't say it.
     #[serde(default)]
-    pub up: Option<String>,
+    pub up: Option<Axis>,
     /// Metres of one unit of the calibration, where the file doesn't say it.
     #[serde(default)]
     pub metres_per_unit: Option<f64>,
@@ -37,4 +51,8 @@ pub struct PlanMultiView {
     /// The silhouettes are for inverse kinematics: no body is looked for in them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inverse_kinematics: Option<InverseKinematics>,
+}
+
+impl Job for PlanMultiView {
+    const KIND: &'static str = "plan-multi-view";
 }

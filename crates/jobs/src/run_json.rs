@@ -1,11 +1,16 @@
 //! `run.json`: all that decided a result, what was found, and what it took.
 
 use background::CameraQuality;
+use formats::FileRole;
 use serde::Serialize;
 use serde_json::Value;
 use uuid::Uuid;
 
-use crate::{BodyModelFile, CameraReport, InputFile, JobReport, PlanMultiView};
+use crate::{
+    InputFile, JobReport,
+    body_model::BodyModelFile,
+    multi_view::{CameraReport, PlanMultiView},
+};
 
 /// The program that made a result.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -25,14 +30,14 @@ impl Code {
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct FileReport<'a> {
     name: &'a str,
-    role: &'a str,
+    role: FileRole,
     bytes: u64,
     blake3: &'a str,
 }
 
 impl<'a> From<&'a InputFile> for FileReport<'a> {
     fn from(file: &'a InputFile) -> Self {
-        Self { name: &file.name, role: &file.role, bytes: file.bytes, blake3: &file.blake3 }
+        Self { name: &file.name, role: file.role, bytes: file.bytes, blake3: &file.blake3 }
     }
 }
 

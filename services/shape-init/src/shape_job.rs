@@ -1,11 +1,15 @@
 //! The job that finds pose and shape of the person in the first frames and writes the results.
 
-use std::{sync::Arc, time::Instant};
+use std::sync::Arc;
 
 use body::BodyModel;
-use camera_jobs::{CameraClips, Silhouettes, TrackingSession, named, reports};
+use camera_jobs::{Silhouettes, reports};
 use formats::image_files;
-use jobs::{CameraReport, MultiViewReport, Object, file_part, picture_name};
+use jobs::{
+    Object, file_part,
+    multi_view::{CameraClips, CameraReport, FitShape, TrackingSession, picture_name},
+    run_json::MultiViewReport,
+};
 use model::Image;
 use multi_view::Parameters;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
@@ -13,11 +17,11 @@ use service::{compute, objects};
 use shape_fit::Fit;
 
 use crate::{
-    INITIALISE_BODY, InputError, Shared, children,
+    InputError, Shared,
+    children::{FIT_SHOWN, children},
     drawing::{Drawer, FITS},
     fit::{self, Found, Moment},
     hull::hull,
-    payload::InitialiseBody,
     results::{self, ResultFile},
     shape_report::shape_report,
 };
@@ -35,30 +39,20 @@ const LATER_TRIES: usize = 7;
 /// Frames a second where no file tells.
 const FRAME_RATE: f64 = 30.0;
 
-pub(crate) struct InitialiseHandler {
-    shared: Arc<Shared>,
+pub(crate) struct ShapeHandler {
+    pub shared: Arc<Shared>,
 }
 
-impl InitialiseHandler {
-    pub fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
-}
+impl Handler for ShapeHandler {
+    type Job = FitShape;
 
-impl Handler for InitialiseHandler {
-    fn kind(&self) -> &'static str {
-        INITIALISE_BODY
-    }
-
-    async fn run(&self, job: JobContext) -> Result<Outcome, JobError> {
-        let started = Instant::now();
+    async fn run(&self, context: JobContext, job: FitShape) -> Result<Outcome, JobError> {
+        let FitShape { request, mut warnings, plan } = job;
         let Shared { resources, models } = &*self.shared;
-        objects::clean_up_earlier_attempts(&resources.store, &job).await;
-        let InitialiseBody { request, mut warnings, plan } = job.payload()?;
-        let shown = if request.parameters.track { children::INITIALISE_SHOWN } else { 1.0 };
-        let progress = |share: f64, phrase: &str| job.progress(shown * share, phrase);
+        let shown = if request.parameters.track { FIT_SHOWN } else { 1.0 };
+        let progress = |share: f64, phrase: &str| context.progress(shown * share, phrase);
         progress(0.0, "reading the silhouettes");
-        let artefacts = resources.artefacts_before(&job).await?;
+        let artefacts = resources.artefacts_before(&context).await?;
         let cameras = reports(resources, &artefacts).await?;
         warnings.extend(cameras.iter().flat_map(|camera| camera.warnings.iter().cloned()));
         let clips: Result<Vec<_>, _> =
@@ -66,20 +60,20 @@ impl Handler for InitialiseHandler {
         let clips = clips?;
         let end_frame = end_frame(&cameras, &mut warnings);
         let model = models.get(&request.body_model).await?;
-        job.check()?;
+        context.check()?;
         progress(0.1, "finding pose and shape");
         let parameters = &request.parameters;
-        let found = self.find(&job, &model, parameters, &clips, end_frame).await;
+        let found = self.find(&context, &model, parameters, &clips, end_frame).await;
         let found = found.map_err(|error| explained(error, &cameras))?;
-        job.check()?;
+        context.check()?;
         let Found { moments, fits, left_out } = found;
         let (moments, fits) = (Arc::new(moments), Arc::new(fits));
         warnings.extend(left_out);
         warnings.extend(doubts(&fits));
         progress(0.7, "carving the visual hull");
-        let (of, cell_m) = (moments.clone(), parameters.hull_voxel_m);
-        let carved = compute::run(move || of.first().map(|first| hull(&first.views, cell_m))).await;
-        job.check()?;
+        let (seen, cell_m) = (moments.clone(), parameters.hull_voxel_m);
+        let carved = compute::run(move || seen.first().map(|first| hull(&first.views, cell_m))).await;
+        context.check()?;
         let mut files = Vec::new();
         match carved {
             Some(Ok(carved)) => files.push(results::mesh("hull.ply", &carved.mesh)),
@@ -96,23 +90,23 @@ impl Handler for InitialiseHandler {
         }
         let mut artefacts_of_results = Vec::new();
         for file in files {
-            artefacts_of_results.push(self.write(&job, file).await?);
+            artefacts_of_results.push(self.write(&context, file).await?);
         }
         for (index, camera) in cameras.iter().enumerate() {
-            job.check()?;
+            context.check()?;
             progress(0.85 + 0.14 * index as f64 / cameras.len() as f64, "drawing overlays");
             if let Some(file) = self.overlay(camera, &artefacts, &moments, (&model, &fits)).await? {
-                artefacts_of_results.push(self.write(&job, file).await?);
+                artefacts_of_results.push(self.write(&context, file).await?);
             }
         }
-        let report = resources.job_report(&job, started, moments.len());
+        let report = resources.job_report(&context, moments.len());
         let mut outcome = artefacts_of_results.into_iter().fold(Outcome::default(), Outcome::artefact);
         if parameters.track {
             let session = TrackingSession {
                 alpha: fits.first().map_or(Vec::new(), |fit| fit.alpha.clone()),
                 first_frame: parameters.first_frame,
                 plan,
-                initialise: report,
+                fit_shape: report,
                 clips,
                 cameras,
                 end_frame,
@@ -122,26 +116,32 @@ impl Handler for InitialiseHandler {
             };
             let content = serde_json::to_vec(&session).map_err(JobError::retry)?;
             let artefact =
-                objects::write(&resources.store, &job, SESSION, "application/json", content).await?;
-            let object = Object { store_key: artefact.store_key.clone(), blake3: artefact.blake3.clone() };
-            outcome = outcome.artefact(artefact).children(children::of(&session, &object)?);
+                objects::write(&resources.store, &context, SESSION, "application/json", content).await?;
+            let children = children(&session, &Object::from(&artefact))?;
+            outcome = outcome.artefact(artefact).children(children);
         } else {
-            let report =
-                MultiViewReport::new(job.run_id().0, &request, (&plan, &report), &cameras, &warnings, None);
+            let report = MultiViewReport::new(
+                context.run_id().0,
+                &request,
+                (&plan, &report),
+                &cameras,
+                &warnings,
+                None,
+            );
             let content = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
             let run = ResultFile { name: RUN.to_owned(), media_type: "application/json", content };
-            outcome = outcome.artefact(self.write(&job, run).await?);
+            outcome = outcome.artefact(self.write(&context, run).await?);
         }
         Ok(outcome)
     }
 }
 
-impl InitialiseHandler {
+impl ShapeHandler {
     /// Pose and shape in the frames that were asked for. Where the person is to be followed and is not in these yet, they are
     /// looked for in others.
     async fn find(
         &self,
-        job: &JobContext,
+        context: &JobContext,
         model: &Arc<BodyModel>,
         parameters: &Parameters,
         clips: &[CameraClips],
@@ -154,7 +154,7 @@ impl InitialiseHandler {
         };
         let spread = Parameters { shape_frames: LATER_TRIES + 1, shape_step: None, ..parameters.clone() };
         for frame in spread.frames_of_shape(end_frame).into_iter().filter(|frame| !wanted.contains(frame)) {
-            job.check()?;
+            context.check()?;
             match self.find_in(model, parameters, clips, &[frame]).await {
                 Err(FindError::Nobody(_)) => {}
                 Err(error) => return Err(error),
@@ -215,7 +215,8 @@ impl InitialiseHandler {
         (model, fits): (&Arc<BodyModel>, &Arc<Vec<Fit>>),
     ) -> Result<Option<ResultFile>, JobError> {
         let Some(frame) = moments.first().map(|moment| moment.frame) else { return Ok(None) };
-        let Some(artefact) = named(artefacts, &picture_name(camera.index, frame)) else { return Ok(None) };
+        let picture = picture_name(camera.index, frame);
+        let Some(artefact) = artefacts.iter().find(|a| a.name == picture) else { return Ok(None) };
         let bytes = self.shared.resources.read_artefact(artefact, MAX_PICTURE_BYTES).await?;
         let own = camera.camera.camera().map_err(JobError::retry)?;
         let name = format!("overlay_{}.png", file_part(&camera.camera.name, camera.index));
@@ -231,9 +232,15 @@ impl InitialiseHandler {
         Ok(Some(drawn.await?))
     }
 
-    async fn write(&self, job: &JobContext, file: ResultFile) -> Result<Artefact, JobError> {
-        objects::write_result(&self.shared.resources.store, job, &file.name, file.media_type, file.content)
-            .await
+    async fn write(&self, context: &JobContext, file: ResultFile) -> Result<Artefact, JobError> {
+        objects::write_result(
+            &self.shared.resources.store,
+            context,
+            &file.name,
+            file.media_type,
+            file.content,
+        )
+        .await
     }
 }
 

@@ -1,25 +1,29 @@
-use jobs::{CameraReport, JobReport, Object, PlanMultiView};
-use queue::JobError;
+//! Finding the shape of a person, and following them with it.
+
+use queue::Job;
 use serde::{Deserialize, Serialize};
-use service::{
-    Resources,
-    objects::{self, Input},
-};
 
-use crate::CameraClips;
+use super::{CameraClips, CameraReport, PlanMultiView};
+use crate::{JobReport, Object};
 
-/// Tracks one chunk of a session: [`TrackChunk`], taken by the refinement service.
-pub const TRACK_CHUNK: &str = "track-chunk";
-/// Puts the chunks together and writes the results: [`MergeTracks`], taken by the refinement service.
-pub const MERGE_TRACKS: &str = "merge-tracks";
-/// Draws the body over what a camera saw: [`DrawOverlay`], taken by the shape-init service.
-pub const DRAW_OVERLAY: &str = "draw-overlay";
-
-/// Name of the artefact that [`MERGE_TRACKS`] leaves for [`DRAW_OVERLAY`]: a `tracking::Chunk` of the whole session.
+/// Name of the artefact that [`MergeTracks`] leaves for [`DrawOverlay`]: a `tracking::Chunk` of the whole session.
 pub const TRACKED: &str = "tracked.bin";
 
-/// Largest report of a session, bytes: a clip of ten minutes takes a few hundred.
-const MAX_BYTES: u64 = 64 << 20;
+/// Finds pose and shape in the first frames, and enqueues the jobs that follow the person. Made by the plan, taken by the
+/// shape-init service.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitShape {
+    /// what the plan was given
+    pub request: PlanMultiView,
+    /// what was sloppy about the files
+    pub warnings: Vec<String>,
+    /// what the plan itself took
+    pub plan: JobReport,
+}
+
+impl Job for FitShape {
+    const KIND: &'static str = "fit-shape";
+}
 
 /// What is known of a session when the person's shape was found: all that the jobs that follow them are given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,7 +33,8 @@ pub struct TrackingSession {
     /// what the plan took
     pub plan: JobReport,
     /// what it took to find the shape
-    pub initialise: JobReport,
+    #[serde(rename = "initialise")]
+    pub fit_shape: JobReport,
     /// what was found of every camera
     pub cameras: Vec<CameraReport>,
     /// and its silhouettes, in the same order
@@ -46,20 +51,7 @@ pub struct TrackingSession {
     pub warnings: Vec<String>,
 }
 
-impl TrackingSession {
-    /// Reads the artefact.
-    ///
-    /// # Errors
-    /// As [`objects::read`].
-    pub async fn read(resources: &Resources, object: &Object) -> Result<Self, JobError> {
-        let Object { store_key, blake3 } = object;
-        let input = Input { name: "the session's artefact", store_key, blake3 };
-        let bytes = objects::read(&resources.store, input, MAX_BYTES).await?;
-        serde_json::from_slice(&bytes).map_err(JobError::retry)
-    }
-}
-
-/// Payload of [`TRACK_CHUNK`].
+/// Follows the person through one chunk of a session. Taken by the refinement service.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TrackChunk {
     /// a [`TrackingSession`]
@@ -74,18 +66,32 @@ pub struct TrackChunk {
     pub end: usize,
 }
 
-/// Payload of [`MERGE_TRACKS`].
+impl Job for TrackChunk {
+    const KIND: &'static str = "track-chunk";
+    // More than usual, as one may be lost with each worker that is taken away.
+    const MAX_ATTEMPTS: i32 = 5;
+}
+
+/// Puts the chunks together and writes the results. Taken by the refinement service.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MergeTracks {
     /// a [`TrackingSession`]
     pub session: Object,
 }
 
-/// Payload of [`DRAW_OVERLAY`].
+impl Job for MergeTracks {
+    const KIND: &'static str = "merge-tracks";
+}
+
+/// Draws the body over what a camera saw. Taken by the shape-init service.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DrawOverlay {
     /// a [`TrackingSession`]
     pub session: Object,
     /// index of the camera
     pub camera: usize,
+}
+
+impl Job for DrawOverlay {
+    const KIND: &'static str = "draw-overlay";
 }

@@ -1,17 +1,21 @@
-//! What the jobs of this service are given. Everything that decides the result is in here.
+//! Runs from control points and a motion database: plan, chunks, merge.
 
-use crate::performer::FittedReport;
-use crate::{control::Markers, error::InputError};
-use formats::{BvhOptions, PointsOptions};
-pub(crate) use jobs::JobReport;
-pub use jobs::{InputFile, MotionDatabaseFile, Object};
-use model::Axis;
-use serde::{Deserialize, Serialize};
-use sparse::Parameters;
 use std::collections::BTreeMap;
+
+use formats::{BvhOptions, PointsOptions, session};
+use model::Axis;
+use queue::Job;
+use serde::{Deserialize, Serialize};
+use skeleton_fit::{LimbScale, Sizes};
+use sparse::Parameters;
 use uuid::Uuid;
 
-/// Payload of [`crate::PLAN_SPARSE`], made by the gateway.
+use crate::{InputFile, JobReport, Object, motion_database::MotionDatabaseFile};
+
+/// The kind of such runs.
+pub const RUN_KIND: &str = "reconstruction";
+
+/// Reads a session's files and plans its chunks. Taken by the reconstruction service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanSparse {
     /// The session.
@@ -50,39 +54,24 @@ pub struct PlanSparse {
 }
 
 fn centimetres() -> f64 {
-    formats::BvhOptions::default().metres_per_unit
+    BvhOptions::default().metres_per_unit
+}
+
+impl Job for PlanSparse {
+    const KIND: &'static str = "plan-sparse";
 }
 
 impl PlanSparse {
-    /// What the names of the file of control points stand for.
-    ///
-    /// # Errors
-    /// If the marker map or set is none.
-    pub(crate) fn markers(&self) -> Result<Markers, InputError> {
-        let [map, set, prefix] =
-            [&self.marker_map, &self.marker_set, &self.marker_prefix].map(Option::as_deref);
-        Markers::new(&self.mapping, map, set, prefix)
-    }
-
     /// How the session's files are to be read.
-    pub(crate) fn reading(&self) -> Reading {
-        Reading {
+    pub fn reading(&self) -> session::Options {
+        session::Options {
             points: PointsOptions { up: self.up, sigma_m: self.parameters.control_sigma_m },
             bvh: BvhOptions { metres_per_unit: self.bvh_metres_per_unit },
         }
     }
 }
 
-/// What the files do not say of themselves.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Reading {
-    /// Of TRC and C3D files.
-    pub points: PointsOptions,
-    /// Of BVH files.
-    pub bvh: BvhOptions,
-}
-
-/// Payload of [`crate::RECONSTRUCT_CHUNK`], made by the plan.
+/// Reconstructs one chunk of a session. Made by the plan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReconstructChunk {
     /// The canonical session.
@@ -101,7 +90,13 @@ pub struct ReconstructChunk {
     pub end: usize,
 }
 
-/// Payload of [`crate::MERGE_CHUNKS`], made by the plan.
+impl Job for ReconstructChunk {
+    const KIND: &'static str = "reconstruct-chunk";
+    // More than usual, as one may be lost with each worker that is taken away.
+    const MAX_ATTEMPTS: i32 = 5;
+}
+
+/// Puts the chunks together and writes the results. Made by the plan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MergeChunks {
     /// What the plan was given.
@@ -117,4 +112,25 @@ pub struct MergeChunks {
     pub fitted: Option<FittedReport>,
     /// What the plan itself took.
     pub plan: JobReport,
+}
+
+impl Job for MergeChunks {
+    const KIND: &'static str = "merge-chunks";
+}
+
+/// The skeleton that was fitted to a performer of whom only the paths of some points were uploaded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FittedReport {
+    /// lengths of the whole body, metres
+    pub sizes: Sizes,
+    /// scale of the arms against the database's mean skeleton
+    pub arms: LimbScale,
+    /// scale of the legs
+    pub legs: LimbScale,
+    /// scale of the trunk
+    pub trunk: LimbScale,
+    /// distinct skeletons of the database, of which the mean was taken
+    pub performers: usize,
+    /// spans of the session that decided
+    pub spans: usize,
 }

@@ -1,10 +1,32 @@
-//! What jobs on the cameras of a session leave for those after them.
+//! The silhouettes of one camera: the job that makes them, and what it leaves for those after it.
 
 use background::CameraQuality;
-use multi_view::CameraRecord;
+use multi_view::{CameraRecord, Parameters};
+use queue::{Artefact, Job, JobError};
 use serde::{Deserialize, Serialize};
 
-use crate::{InputFile, JobReport};
+use crate::{InputFile, JobReport, Object, named};
+
+/// Makes the silhouettes of one camera. Made by the plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MakeSilhouettes {
+    /// index of the camera among those of the run
+    pub index: usize,
+    /// as it was calibrated
+    pub camera: CameraRecord,
+    /// its pictures
+    pub source: Source,
+    /// the empty scene
+    pub plate: Option<Source>,
+    /// all resolved
+    pub parameters: Parameters,
+}
+
+impl Job for MakeSilhouettes {
+    const KIND: &'static str = "make-silhouettes";
+    // More than usual, as one may be lost with each worker that is taken away.
+    const MAX_ATTEMPTS: i32 = 5;
+}
 
 /// Where the pictures of a camera are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -89,6 +111,46 @@ pub struct ClipPlace {
     pub num_frames: usize,
 }
 
+/// A clip of silhouettes, or of points that were found again, in the store.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredClip {
+    /// first frame in it
+    pub first_frame: usize,
+    /// frames in it
+    pub num_frames: usize,
+    /// where it is
+    pub object: Object,
+}
+
+/// A camera and its clips, in the order of their frames.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraClips {
+    /// as it fits the silhouettes
+    pub camera: CameraRecord,
+    /// without gaps
+    pub clips: Vec<StoredClip>,
+    /// points that were found again, of the same frames; none where there are no pictures
+    #[serde(default)]
+    pub matches: Vec<StoredClip>,
+}
+
+impl CameraClips {
+    /// The clips that a camera's job reported, among what it left.
+    ///
+    /// # Errors
+    /// To be tried again if one is missing.
+    pub fn new(report: &CameraReport, artefacts: &[Artefact]) -> Result<Self, JobError> {
+        let stored = |place: &ClipPlace| {
+            let object = Object::from(named(artefacts, &place.name)?);
+            Ok(StoredClip { first_frame: place.first_frame, num_frames: place.num_frames, object })
+        };
+        let all =
+            |places: &[ClipPlace]| places.iter().map(stored).collect::<Result<Vec<StoredClip>, JobError>>();
+        let (clips, matches) = (all(&report.clips)?, all(&report.matches)?);
+        Ok(Self { camera: report.camera.clone(), clips, matches })
+    }
+}
+
 /// Name of the artefact with the report of a camera.
 pub fn report_name(index: usize) -> String {
     format!("camera-{index:03}.json")
@@ -107,12 +169,4 @@ pub fn matches_name(index: usize, first_frame: usize) -> String {
 /// Name of the artefact with the picture of a frame of a camera.
 pub fn picture_name(index: usize, frame: usize) -> String {
     format!("picture-{index:03}-{frame:08}.png")
-}
-
-/// A camera's name as a part of a file's.
-pub fn file_part(camera: &str, index: usize) -> String {
-    let kept: String =
-        camera.chars().take(60).map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-    // names that differ in other signs must not collide
-    if kept == camera { kept } else { format!("{kept}_{index}") }
 }
