@@ -32,7 +32,7 @@ pub fn calibration(rows: &[Row], axes: &Axes) -> Option<Table> {
     }
     let text = format!(
         "{}{} Per cent of the true coordinates that lie within one and two of the standard deviations stated for them, over \
-         coordinates and frames. Errors as large as stated give {:.1} and {:.1} %; more means that less was promised.",
+         coordinates and frames. Errors as large as stated give {:.1} and {:.1} %; higher means that the stated ones are too large.",
         note(rows),
         axes.held(&FREE),
         100.0 * WITHIN_ONE,
