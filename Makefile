@@ -1,6 +1,6 @@
 # `make` alone lists what there is.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-compose build lint bench setup
+.PHONY: help demo test test-compose build lint bench pictures setup
 
 # A folder with ASF+AMC(.zst) or BVH files for `make demo`; without it, trials are drawn from the sample motion.
 DATA ?=
@@ -27,6 +27,9 @@ lint: setup ## formatting, clippy with warnings denied, purity of the domain cra
 
 bench: setup ## every benchmark
 	cargo bench --locked --workspace
+
+pictures: setup ## the README's pictures anew (docs/pictures); the last one by Blender, where it is installed
+	@scripts/pictures.sh
 
 setup: ## install what is missing (PostgreSQL, a C compiler)
 	@scripts/setup.sh
