@@ -13,11 +13,7 @@
 //! | `MAREY_MAX_OBJECT_BYTES` | 1 GiB | largest object read into memory |
 //! | `MAREY_MAX_INPUT_BYTES` | 8 GiB | unpacked motion files of one motion database |
 //! | `MAREY_MAX_BUILD_BYTES` | 2 GiB | what one job of building a motion database keeps: an archive unpacked, or an index |
-//! | `MAREY_MOTION_INDEX_PEERS` | none | addresses of all motion-index replicas, `http://a:50051,http://b:50051` |
-//! | `MAREY_MOTION_INDEX_SELF` | none | which of them this one is |
 //! | `MAREY_MAX_SESSION_FRAMES` | 432000 | frames of one session at 60 a second: two hours |
-//! | `MAREY_LIVE_STREAMS` | 8 a core | live streams at once |
-//! | `MAREY_LIVE_IDLE_SECS` | 60 | a live stream without frames, or whose poses nobody reads, ends after so long |
 //! | `MAREY_LOG` | `info` | filter: `info`, `warn,motion_index=debug`, … |
 //! | `MAREY_LOG_FORMAT` | `pretty` | `pretty` or `json` |
 
@@ -40,20 +36,6 @@ pub struct Config {
     pub worker: WorkerConfig,
     /// Bounds on memory.
     pub memory: MemoryConfig,
-    /// Live streams.
-    pub live: LiveConfig,
-    /// Other replicas.
-    pub peers: PeersConfig,
-}
-
-/// The replicas of motion-index that share the shards of large databases among themselves.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct PeersConfig {
-    /// Addresses of all of them, this one's too, such as `http://10.0.0.7:50051`; the same on each. None: this one
-    /// answers alone.
-    pub all: Vec<String>,
-    /// Which of them this one is; without it, it asks itself over the network.
-    pub own: Option<String>,
 }
 
 /// How to reach PostgreSQL.
@@ -113,23 +95,6 @@ pub struct MemoryConfig {
     pub max_session_frames: usize,
 }
 
-/// Live streams of one process.
-#[derive(Debug, Clone)]
-pub struct LiveConfig {
-    /// Most streams at once; one has a thread. Default 8 a core: at 60 frames a second and half a millisecond a frame, a
-    /// quarter of it.
-    pub max_streams: usize,
-    /// How long a stream may be without a frame, or its poses without a reader. Default 60 s.
-    pub idle_timeout: Duration,
-}
-
-impl Default for LiveConfig {
-    fn default() -> Self {
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        Self { max_streams: 8 * cores, idle_timeout: Duration::from_secs(60) }
-    }
-}
-
 const GIB: u64 = 1 << 30;
 
 impl Config {
@@ -156,8 +121,6 @@ impl Config {
                 max_build_bytes: 2 * GIB,
                 max_session_frames: 2 * 60 * 60 * 60,
             },
-            live: LiveConfig::default(),
-            peers: PeersConfig::default(),
         }
     }
 
@@ -183,12 +146,6 @@ impl Config {
         vars.set("MAREY_MAX_INPUT_BYTES", &mut config.memory.max_input_bytes)?;
         vars.set("MAREY_MAX_BUILD_BYTES", &mut config.memory.max_build_bytes)?;
         vars.set("MAREY_MAX_SESSION_FRAMES", &mut config.memory.max_session_frames)?;
-        config.peers.all = vars.list("MAREY_MOTION_INDEX_PEERS");
-        config.peers.own = vars.get("MAREY_MOTION_INDEX_SELF");
-        vars.set("MAREY_LIVE_STREAMS", &mut config.live.max_streams)?;
-        let mut idle_secs = config.live.idle_timeout.as_secs();
-        vars.set("MAREY_LIVE_IDLE_SECS", &mut idle_secs)?;
-        config.live.idle_timeout = Duration::from_secs(idle_secs);
         Ok(config)
     }
 }

@@ -14,12 +14,13 @@ impl<'a> Variables<'a> {
         Self { read }
     }
 
-    pub(crate) fn get(&self, name: &str) -> Option<String> {
+    /// A setting, if it is there and not empty.
+    pub fn get(&self, name: &str) -> Option<String> {
         (self.read)(name).filter(|value| !value.is_empty())
     }
 
     /// What stands between commas.
-    pub(crate) fn list(&self, name: &str) -> Vec<String> {
+    pub fn list(&self, name: &str) -> Vec<String> {
         let text = self.get(name).unwrap_or_default();
         text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(str::to_owned).collect()
     }
@@ -40,7 +41,11 @@ impl<'a> Variables<'a> {
         })
     }
 
-    pub(crate) fn set<T: FromStr<Err: std::fmt::Display>>(
+    /// Reads a setting into `to`, which stays as it is where there is none.
+    ///
+    /// # Errors
+    /// [`Error::BadValue`].
+    pub fn set<T: FromStr<Err: std::fmt::Display>>(
         &self,
         name: &'static str,
         to: &mut T,

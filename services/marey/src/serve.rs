@@ -45,11 +45,11 @@ pub fn run(which: &Service) -> anyhow::Result<()> {
                 gateway::run(config, shutdown).await
             }
             Service::MotionIndex => {
-                let config = service::Config::from_variables(&variables, motion_index::DEFAULT_LISTEN)?;
+                let config = motion_index::Config::from_variables(&variables)?;
                 Ok(motion_index::run(config, shutdown).await?)
             }
             Service::Reconstruction => {
-                let config = service::Config::from_variables(&variables, reconstruction::DEFAULT_LISTEN)?;
+                let config = reconstruction::Config::from_variables(&variables)?;
                 Ok(reconstruction::run(config, shutdown).await?)
             }
             Service::ShapeInit => {

@@ -13,6 +13,7 @@
 
 mod build_job;
 mod catalogue;
+pub mod config;
 mod contents;
 mod databases;
 mod error;
@@ -27,13 +28,14 @@ mod shards;
 mod sources;
 mod train_job;
 
+pub use config::Config;
 pub use error::Error;
 
 use databases::Databases;
 use fan_out::FanOut;
 use peers::Peers;
 use proto::v1::motion_index_server::MotionIndexServer;
-use service::{Config, Parts, Resources, Running};
+use service::{Parts, Resources, Running};
 use std::net::SocketAddr;
 use tokio_util::sync::CancellationToken;
 use tonic::service::Routes;
@@ -50,10 +52,14 @@ pub const DEFAULT_LISTEN: SocketAddr =
 /// # Errors
 /// If the address, the store or the database's URL can't be used. A database that does not answer yet is
 /// waited for.
-pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Running, service::Error> {
+pub async fn start(
+    config: impl Into<Config>,
+    shutdown: CancellationToken,
+) -> Result<Running, service::Error> {
+    let Config { service: config, peers } = config.into();
     let resources = Resources::open(&config, NAME)?;
     let pool = resources.pool.clone();
-    let peers = Peers::new(&config.peers).map_err(|error| service::Error::BadValue {
+    let peers = Peers::new(&peers).map_err(|error| service::Error::BadValue {
         name: "MAREY_MOTION_INDEX_PEERS",
         found: error.found,
         expected: format!("addresses such as http://10.0.0.7:50051: {}", error.reason),
@@ -81,6 +87,6 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
 ///
 /// # Errors
 /// As [`start`], and whatever made it stop before.
-pub async fn run(config: Config, shutdown: CancellationToken) -> Result<(), service::Error> {
+pub async fn run(config: impl Into<Config>, shutdown: CancellationToken) -> Result<(), service::Error> {
     start(config, shutdown).await?.stopped().await
 }

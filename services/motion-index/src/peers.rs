@@ -1,7 +1,7 @@
 //! The replicas of this service, and which of them answers for which shard.
 
+use crate::config::PeersConfig;
 use proto::v1::motion_index_client::MotionIndexClient;
-use service::config::PeersConfig;
 use std::{
     sync::Mutex,
     time::{Duration, Instant},

@@ -46,7 +46,7 @@ async fn many_files_are_imported_in_parts_by_several_workers_and_the_result_is_t
     let jobs = [("plan-motion-database", 1), ("import-motion", 3), ("build-motion-database", 1)];
     assert_eq!(kinds, jobs.map(|(kind, count)| (kind.to_owned(), count)));
 
-    fixture.serve(|config| config.worker.concurrency = 3).await;
+    fixture.serve(|config| config.service.worker.concurrency = 3).await;
     let again = fixture.new_database("walks").await;
     let several = fixture.build(&plan(again, files)).await;
     assert_eq!(several.blake3, one.blake3);
@@ -142,7 +142,7 @@ async fn a_divided_database_put_together_is_the_undivided_one() {
 #[tokio::test]
 async fn a_build_that_needs_more_memory_than_there_is_says_so() {
     let mut fixture = Fixture::without_service().await;
-    fixture.serve(|config| config.memory.max_build_bytes = 60_000).await;
+    fixture.serve(|config| config.service.memory.max_build_bytes = 60_000).await;
     let id = fixture.new_database("walks").await;
     let trials: Vec<usize> = (1..=10).collect();
     let message = fixture.fail_to_build(&plan(id, fixture.walks(id, &trials, 60).await)).await;

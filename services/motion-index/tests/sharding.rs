@@ -25,8 +25,8 @@ async fn replicas(count: usize) -> Fixture {
         let (all, own) = (all.clone(), Some(own.clone()));
         fixture
             .serve(|config| {
-                config.grpc.listen = *port;
-                config.peers = service::config::PeersConfig { all, own };
+                config.service.grpc.listen = *port;
+                config.peers = motion_index::config::PeersConfig { all, own };
             })
             .await;
     }

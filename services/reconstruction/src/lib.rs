@@ -13,6 +13,7 @@
 //! not depend on how many workers there were or what happened to them.
 
 mod chunk_job;
+pub mod config;
 mod control;
 mod error;
 mod evaluate;
@@ -28,6 +29,7 @@ mod priors;
 mod rpc;
 mod run_report;
 
+pub use config::Config;
 pub use error::InputError;
 pub use evaluate::{Truth, truth_of};
 pub use inputs::NamedBytes;
@@ -35,7 +37,7 @@ pub use inputs::NamedBytes;
 use camera_jobs::Models;
 use priors::Priors;
 use proto::v1::{live_server::LiveServer, reconstruction_server::ReconstructionServer};
-use service::{Config, Parts, Resources, Running};
+use service::{Parts, Resources, Running};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
@@ -59,7 +61,11 @@ struct Shared {
 /// # Errors
 /// If the address, the store or the database's URL can't be used. A database that does not answer yet is
 /// waited for.
-pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Running, service::Error> {
+pub async fn start(
+    config: impl Into<Config>,
+    shutdown: CancellationToken,
+) -> Result<Running, service::Error> {
+    let Config { service: config, live } = config.into();
     let resources = Resources::open(&config, NAME)?;
     let pool = resources.pool.clone();
     let shared = Arc::new(Shared {
@@ -67,7 +73,7 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
         models: Models::new(resources.clone()),
         resources,
     });
-    let live = live::LiveRpc::new(shared.clone(), config.live.clone(), shutdown.clone());
+    let live = live::LiveRpc::new(shared.clone(), live, shutdown.clone());
     let live = LiveServer::new(live).max_decoding_message_size(live::MAX_REQUEST_BYTES);
     let rpc = ReconstructionServer::new(rpc::Rpc::new(shared.clone()))
         .max_decoding_message_size(ik::call::MAX_REQUEST_BYTES);
@@ -93,6 +99,6 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
 ///
 /// # Errors
 /// As [`start`], and whatever made it stop before.
-pub async fn run(config: Config, shutdown: CancellationToken) -> Result<(), service::Error> {
+pub async fn run(config: impl Into<Config>, shutdown: CancellationToken) -> Result<(), service::Error> {
     start(config, shutdown).await?.stopped().await
 }

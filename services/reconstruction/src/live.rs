@@ -7,11 +7,10 @@ mod queue;
 mod start;
 mod stream;
 
-use crate::{Shared, error::CallError};
+use crate::{Shared, config::LiveConfig, error::CallError};
 use library::Cache;
 use motion_db::ControlTable;
 use proto::v1::{self, live_request, live_server};
-use service::config::LiveConfig;
 use std::{pin::Pin, sync::Arc, time::Duration};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_stream::Stream;

@@ -1,6 +1,7 @@
 //! Live streams as a gateway has them: real gRPC, a real PostgreSQL, a real folder.
 
 use proto::v1::{self, LiveDelivery, live_client::LiveClient, live_request, live_response};
+use reconstruction::config::LiveConfig;
 use testkit::{
     sandbox::{Sandbox, Service},
     walker,
@@ -23,11 +24,11 @@ impl Fixture {
     async fn new() -> Self {
         let sandbox = Sandbox::new().await;
         let motion_database = sandbox.add_walks().await.id;
-        let follow_two = |config: &mut service::Config| {
-            config.worker.concurrency = 0;
-            config.live.max_streams = 2;
+        let start = async |service, shutdown| {
+            let live = LiveConfig { max_streams: 2, ..LiveConfig::default() };
+            reconstruction::start(reconstruction::Config { service, live }, shutdown).await
         };
-        let service = sandbox.serve(reconstruction::start, follow_two).await;
+        let service = sandbox.serve(start, |config| config.worker.concurrency = 0).await;
         Self { service, motion_database, _sandbox: sandbox }
     }
 

@@ -4,11 +4,10 @@ use super::{
     queue::{Gone, Queue},
     start::Start,
 };
-use crate::error::CallError;
+use crate::{config::LiveConfig, error::CallError};
 use model::Samples;
 use nalgebra::Vector3;
 use proto::v1::{self, live_request, live_response};
-use service::config::LiveConfig;
 use sparse::{Live, LivePose, Reconstructor};
 use std::{
     sync::{
