@@ -7,13 +7,11 @@ use motion_db::Clip;
 use sparse::{Method, Parameters};
 
 fn load(folder: &Path) -> Vec<Clip> {
-    let clip = |row: testkit::shared::IndexRow| {
-        let (name, subject) = (row.get("trial").to_owned(), row.get("subject").to_owned());
-        let acclaim =
-            formats::asf::read(&testkit::shared::read(folder, &format!("{subject}.asf"))).unwrap().value;
-        let bytes = testkit::shared::read(folder, &format!("{name}.amc"));
-        let motion = formats::amc::read(&bytes, &acclaim, 120.0).unwrap().value;
-        Clip { name, subject, action: row.get("action").to_owned(), motion }
+    let clip = |row: testkit::shared::IndexRow| Clip {
+        name: row.get("trial").to_owned(),
+        subject: row.get("subject").to_owned(),
+        action: row.get("action").to_owned(),
+        motion: testkit::shared::trial(folder, row.get("trial")),
     };
     testkit::shared::index(folder).into_iter().map(clip).collect()
 }

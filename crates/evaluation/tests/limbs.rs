@@ -5,17 +5,8 @@ use std::path::Path;
 use body::BodyModel;
 use evaluation::limbs::{LimbErrors, Limbs, Method, run_all};
 use inverse_kinematics::Recording;
-use model::{Motion, Silhouette};
+use model::Silhouette;
 use vision::scene::SilhouetteNoise;
-
-fn recorded(folder: &Path, trial: &str) -> Motion {
-    let (subject, _) = trial.split_once('_').unwrap();
-    let acclaim =
-        formats::asf::read(&testkit::shared::read(folder, &format!("{subject}.asf"))).unwrap().value;
-    formats::amc::read(&testkit::shared::read(folder, &format!("{trial}.amc")), &acclaim, 120.0)
-        .unwrap()
-        .value
-}
 
 fn noisy(mut seen: Silhouette, frame: usize, camera: usize) -> Silhouette {
     SilhouetteNoise::default().add_to(&mut seen, frame as u64, camera as u64);
@@ -45,7 +36,8 @@ fn evaluate(folder: &Path, limbs: Limbs, trials: &[&str], frames: usize) -> [Vec
     let recordings: Vec<_> = trials
         .iter()
         .map(|trial| {
-            let mut recording = Recording::new(&model, &shape, &recorded(folder, trial), 4).unwrap();
+            let mut recording =
+                Recording::new(&model, &shape, &testkit::shared::trial(folder, trial), 4).unwrap();
             recording.poses.truncate(frames);
             (recording, limbs)
         })

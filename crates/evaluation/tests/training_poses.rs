@@ -1,7 +1,5 @@
 //! Real CMU motion on the body.
 
-use std::path::Path;
-
 use body::{BodyModel, Posed};
 use evaluation::{
     Error,
@@ -13,15 +11,6 @@ use motion_db::{Clip, MotionDatabase};
 use nalgebra::Vector3;
 
 const TRIALS: [&str; 6] = ["13_17", "07_01", "16_35", "64_01", "49_02", "91_02"];
-
-fn recorded(folder: &Path, trial: &str) -> Motion {
-    let (subject, _) = trial.split_once('_').unwrap();
-    let acclaim =
-        formats::asf::read(&testkit::shared::read(folder, &format!("{subject}.asf"))).unwrap().value;
-    formats::amc::read(&testkit::shared::read(folder, &format!("{trial}.amc")), &acclaim, 120.0)
-        .unwrap()
-        .value
-}
 
 /// Bones of the recording and of the body: upper and lower arms and legs.
 const BONES: [([&str; 2], [&str; 2]); 8] = [
@@ -74,7 +63,7 @@ fn the_bodys_bones_point_as_the_recorded_ones_do() {
     let model = BodyModel::shipped();
     let mut degrees = Vec::new();
     for trial in TRIALS {
-        let motion = recorded(&folder, trial);
+        let motion = testkit::shared::trial(&folder, trial);
         let poses = recorded_poses(&model, &[(trial, &motion)]).unwrap();
         let expected = directions(&motion);
         assert_eq!(poses.len(), expected.len());
@@ -113,7 +102,7 @@ fn a_hundred_training_poses_are_near_to_all_that_people_did() {
             name: (*trial).into(),
             subject: trial.split_once('_').unwrap().0.into(),
             action: String::new(),
-            motion: recorded(&folder, trial),
+            motion: testkit::shared::trial(&folder, trial),
         })
         .collect();
     let database = MotionDatabase::build(&clips).unwrap();

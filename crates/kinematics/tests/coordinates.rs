@@ -4,7 +4,7 @@ mod fixtures;
 
 use std::f64::consts::{PI, TAU};
 
-use fixtures::{Numbers, bvh_rig, parametrisations, recorded, references_at, walk};
+use fixtures::{Numbers, bvh_rig, parametrisations, references_at, walk};
 use kinematics::{Error, Kinematics, Parametrisation, References, State, can_flip};
 use model::{Axis, Channel, Joint, Skeleton};
 use proptest::prelude::*;
@@ -177,7 +177,7 @@ fn every_pose_of_recorded_motion_comes_back() {
         if !folder.join(format!("{trial}.amc.zst")).exists() {
             continue;
         }
-        let motion = recorded(&folder, trial);
+        let motion = testkit::shared::trial(&folder, trial);
         for (_, parametrisation) in parametrisations(&motion) {
             for pose in motion.poses() {
                 check_round_trip(motion.skeleton(), &parametrisation, pose, 1e-6);

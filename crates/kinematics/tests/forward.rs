@@ -4,7 +4,7 @@ mod fixtures;
 
 use std::collections::HashMap;
 
-use fixtures::{Numbers, bvh_rig, recorded, walk};
+use fixtures::{Numbers, bvh_rig, walk};
 use kinematics::{Kinematics, Parametrisation};
 use model::{ChannelKind, Motion};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -155,7 +155,7 @@ fn recorded_motion_stands_where_the_acclaim_formula_puts_it() {
         }
         let text = |name: String| String::from_utf8(testkit::shared::read(&folder, &name)).unwrap();
         let (asf, amc) = (text(format!("{subject}.asf")), text(format!("{trial}.amc")));
-        check_against_text(&recorded(&folder, trial), &asf, &amc, 1e-9);
+        check_against_text(&testkit::shared::trial(&folder, trial), &asf, &amc, 1e-9);
     }
 }
 

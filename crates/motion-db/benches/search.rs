@@ -13,15 +13,13 @@ fn main() {
 
 fn recorded() -> Option<Vec<Clip>> {
     let folder = testkit::shared::find("data/motion/five-actions", "search")?;
-    let clip = |row: testkit::shared::IndexRow| {
-        let (name, subject) = (row.get("trial").to_owned(), row.get("subject").to_owned());
-        let acclaim =
-            formats::asf::read(&testkit::shared::read(&folder, &format!("{subject}.asf"))).ok()?.value;
-        let bytes = testkit::shared::read(&folder, &format!("{name}.amc"));
-        let motion = formats::amc::read(&bytes, &acclaim, 120.0).ok()?.value;
-        Some(Clip { name, subject, action: row.get("action").to_owned(), motion })
+    let clip = |row: testkit::shared::IndexRow| Clip {
+        name: row.get("trial").to_owned(),
+        subject: row.get("subject").to_owned(),
+        action: row.get("action").to_owned(),
+        motion: testkit::shared::trial(&folder, row.get("trial")),
     };
-    testkit::shared::index(&folder).into_iter().map(clip).collect()
+    Some(testkit::shared::index(&folder).into_iter().map(clip).collect())
 }
 
 fn drawn(seed: u64) -> Option<Clip> {

@@ -3,20 +3,17 @@
 
 use std::path::Path;
 
-use formats::{amc, asf};
 use kinematics::{Parametrisation, References};
 use model::Motion;
 use sample_motion::{Action, DrawOptions, LabelledMotion, Model};
 
 fn recorded(folder: &Path, wanted: impl Fn(&str) -> bool) -> Vec<LabelledMotion> {
     let rows = testkit::shared::index(folder).into_iter().filter(|row| wanted(row.get("action")));
-    rows.map(|row| {
-        let (name, subject) = (row.get("trial").to_owned(), row.get("subject").to_owned());
-        let skeleton = asf::read(&testkit::shared::read(folder, &format!("{subject}.asf"))).unwrap().value;
-        let motion = amc::read(&testkit::shared::read(folder, &format!("{name}.amc")), &skeleton, 120.0)
-            .unwrap()
-            .value;
-        LabelledMotion { name, subject, action: row.get("action").parse().unwrap(), motion }
+    rows.map(|row| LabelledMotion {
+        name: row.get("trial").to_owned(),
+        subject: row.get("subject").to_owned(),
+        action: row.get("action").parse().unwrap(),
+        motion: testkit::shared::trial(folder, row.get("trial")),
     })
     .collect()
 }

@@ -79,3 +79,14 @@ pub fn index(folder: &Path) -> Vec<IndexRow> {
         })
         .collect()
 }
+
+/// A trial of a folder of CMU's recordings, such as `16_15`, on the skeleton of its performer; 120 frames a second.
+///
+/// # Panics
+/// If there is no such trial.
+#[cfg(feature = "motion")]
+pub fn trial(folder: &Path, name: &str) -> model::Motion {
+    let performer = name.split('_').next().unwrap_or_default();
+    let skeleton = formats::asf::read(&read(folder, &format!("{performer}.asf"))).unwrap().value;
+    formats::amc::read(&read(folder, &format!("{name}.amc")), &skeleton, 120.0).unwrap().value
+}
