@@ -71,7 +71,7 @@ impl Distortion {
     }
 
     /// Takes the colours of a plate; the spread is the clip's noise, more at edges, which are never quite in place.
-    pub(crate) fn of_plate(
+    pub(crate) fn from_plate(
         parameters: &Parameters,
         plate: &Image,
         frames: &[Image],

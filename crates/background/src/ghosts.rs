@@ -44,8 +44,8 @@ pub(crate) fn ghosts(
     let smallest = (SMALLEST * (width * height) as f64) as usize;
     let mut ghosts = Silhouette::empty(width, height);
     labels.draw(&mut ghosts, true, |region| {
-        let [of_plate, of_clip] = strengths[region];
-        labels.regions()[region].area >= smallest && of_plate * 4 > of_clip * 5
+        let [from_plate, from_clip] = strengths[region];
+        labels.regions()[region].area >= smallest && from_plate * 4 > from_clip * 5
     });
     ghosts
 }

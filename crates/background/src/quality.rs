@@ -263,22 +263,22 @@ impl Judge {
     /// All frames so far, with advice.
     pub fn camera(&self, prospects: &Prospects) -> CameraQuality {
         let sums = &self.sums;
-        let of_frames = |count: usize| count as f64 / sums.frames.max(1) as f64;
-        let of_people = |sum: f64| sum / sums.people.max(1) as f64;
+        let per_frame = |count: usize| count as f64 / sums.frames.max(1) as f64;
+        let per_person = |sum: f64| sum / sums.people.max(1) as f64;
         let mut camera = CameraQuality {
             num_frames: sums.frames,
-            person_share: of_frames(sums.people),
+            person_share: per_frame(sums.people),
             stay_share: prospects.stay_share,
             motion_share: prospects.motion_share,
             ghost_share: prospects.ghost_share,
             plate_differing: prospects.plate_differing,
-            border_share: of_frames(sums.touching),
-            several_share: of_frames(sums.several),
-            jump_share: of_frames(sums.jumps),
-            height_share: of_people(sums.means.height_share),
-            shadow_share: of_people(sums.means.shadow_share),
-            thin_share: of_people(sums.means.thin_share),
-            foreign_edge_share: of_people(sums.means.foreign_edge_share),
+            border_share: per_frame(sums.touching),
+            several_share: per_frame(sums.several),
+            jump_share: per_frame(sums.jumps),
+            height_share: per_person(sums.means.height_share),
+            shadow_share: per_person(sums.means.shadow_share),
+            thin_share: per_person(sums.means.thin_share),
+            foreign_edge_share: per_person(sums.means.foreign_edge_share),
             score: sums.means.score / sums.frames.max(1) as f64,
             advice: Vec::new(),
         };

@@ -77,7 +77,7 @@ impl Segmenter {
             (ModelKind::Plate, None) => return Err(Error::NoPlate),
             (ModelKind::Plate | ModelKind::Auto, Some(plate)) => {
                 let aligned = AlignedPlate::new(parameters, plate, &statistics.median)?;
-                let mut model = Distortion::of_plate(parameters, &aligned.image, sample, &statistics);
+                let mut model = Distortion::from_plate(parameters, &aligned.image, sample, &statistics);
                 let still = still(sample, &statistics);
                 let mut classes = Classes::new(width, height);
                 // a copy, because classifying learns

@@ -144,8 +144,8 @@ fn a_waving_curtain_is_background_for_the_mixture() {
     let scene = Scene { waves: true, ..PLAIN };
     let (mean, _, _) = run("waves", &scene, ModelKind::Mixture);
     assert!(mean > 0.9, "{mean}");
-    let (of_one_colour, _, _) = run("waves", &scene, ModelKind::Adaptive);
-    assert!(mean > of_one_colour + 0.02, "{mean} {of_one_colour}");
+    let (one_colour, _, _) = run("waves", &scene, ModelKind::Adaptive);
+    assert!(mean > one_colour + 0.02, "{mean} {one_colour}");
 }
 
 #[test]

@@ -192,7 +192,7 @@ mod tests {
         FootTracks { frame_rate: 60.0, positions: (0..frames).map(position).collect() }
     }
 
-    fn of_left(contacts: &Contacts) -> Vec<Range<usize>> {
+    fn left_standing(contacts: &Contacts) -> Vec<Range<usize>> {
         contacts.all().iter().filter(|c| c.point == 1).map(|c| c.frames.clone()).collect()
     }
 
@@ -206,7 +206,7 @@ mod tests {
         };
         let tracks = tracks(90, step);
         let contacts = detect(&tracks, &DetectSettings::default());
-        let found = of_left(&contacts);
+        let found = left_standing(&contacts);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(found[0].start == 0 && (28..=32).contains(&found[0].end), "{found:?}");
         assert!((58..=62).contains(&found[1].start) && found[1].end == 90, "{found:?}");
@@ -217,12 +217,15 @@ mod tests {
     fn the_slide_of_a_known_speed_is_measured_and_not_taken_for_standing_when_it_is_on_purpose() {
         let creeping = tracks(120, |t| Vector3::new(0.05 * t, 0.0, 0.0));
         let contacts = detect(&creeping, &DetectSettings::default());
-        assert_eq!(of_left(&contacts), vec![0..120; 1]);
+        assert_eq!(left_standing(&contacts), vec![0..120; 1]);
         // Left at 5 cm/s, right at none.
         assert!((creeping.slide_cm_s(&contacts).unwrap() - 2.5).abs() < 1e-9);
         assert!((creeping.slides_cm_s(&contacts)[60].unwrap() - 5.0).abs() < 1e-9);
         let shuffling = tracks(120, |t| Vector3::new(0.25 * t, 0.0, 0.0));
-        assert_eq!(of_left(&detect(&shuffling, &DetectSettings::default())), Vec::<Range<usize>>::new());
+        assert_eq!(
+            left_standing(&detect(&shuffling, &DetectSettings::default())),
+            Vec::<Range<usize>>::new()
+        );
     }
 
     #[test]
@@ -241,7 +244,7 @@ mod tests {
     fn a_gap_ends_a_contact() {
         let mut tracks = tracks(60, |_| Vector3::zeros());
         tracks.positions[30][1] = Vector3::repeat(f64::NAN);
-        let found = of_left(&detect(&tracks, &DetectSettings::default()));
+        let found = left_standing(&detect(&tracks, &DetectSettings::default()));
         assert_eq!(found.len(), 2);
         assert!(found[0].end <= 30 && found[1].start > 30, "{found:?}");
     }

@@ -89,8 +89,8 @@ impl FootTracks {
         for contact in contacts.all() {
             let end = contact.frames.end.min(self.positions.len());
             let begin = contact.frames.start + 1;
-            let of_contact = slides.iter_mut().enumerate().take(end).skip(begin);
-            for (frame, slide) in of_contact {
+            let standing = slides.iter_mut().enumerate().take(end).skip(begin);
+            for (frame, slide) in standing {
                 let speed = self.step_cm_s(frame, contact.point);
                 let slide: &mut Option<f64> = slide;
                 *slide = Some(slide.map_or(speed, |other| other.max(speed)));

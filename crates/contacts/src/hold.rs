@@ -221,9 +221,9 @@ fn sigmas(
     settings: &HoldSettings,
     legs: [f64; 2],
 ) -> Vec<f64> {
-    let of_kind =
+    let sigma =
         |dof| if parametrisation.is_angle(dof) { settings.angle_sigma_rad } else { settings.root_sigma_m };
-    let mut sigmas: Vec<f64> = (0..skeleton.num_dofs()).map(of_kind).collect();
+    let mut sigmas: Vec<f64> = (0..skeleton.num_dofs()).map(sigma).collect();
     for (point, foot) in feet.points().iter().enumerate() {
         let mut joint = foot.joint;
         while let Some(parent) = skeleton.joints()[joint].parent {

@@ -41,8 +41,8 @@ pub const PAD: usize = 16;
 pub const ROWS: usize = 4;
 
 /// `count` rounded up to a multiple of `of`.
-pub const fn padded(count: usize, of: usize) -> usize {
-    count.div_ceil(of) * of
+pub const fn padded(count: usize, multiple: usize) -> usize {
+    count.div_ceil(multiple) * multiple
 }
 
 /// A stride of at least `columns` for which the rows do not fall on the same few lines of a cache: an odd number of

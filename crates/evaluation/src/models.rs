@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, ops::ControlFlow};
 
-use motion_db::{ClipInfo, MotionDatabase, trial_of};
+use motion_db::{ClipInfo, MotionDatabase, trial_name};
 use rayon::prelude::*;
 use regression::gplvm::{Gplvm, TrainingOptions};
 use sparse::{Method, train_gplvm};
@@ -63,7 +63,7 @@ fn folds(evaluation: &SparseEvaluation<'_>) -> Vec<usize> {
     let mut groups: Vec<&str> = Vec::new();
     let fold = evaluation.test.iter().map(|clip| {
         let group = match evaluation.protocol {
-            Protocol::TrialOut => trial_of(&clip.name),
+            Protocol::TrialOut => trial_name(&clip.name),
             Protocol::SubjectOut => &clip.subject,
             Protocol::TrialIn => "",
         };

@@ -1,6 +1,6 @@
 //! What a trial is reconstructed from: its control points, and how much of the database.
 
-use motion_db::{Clip, ClipInfo, trial_of};
+use motion_db::{Clip, ClipInfo, trial_name};
 use serde::{Deserialize, Serialize};
 
 /// The papers' sets of control points, by their number.
@@ -35,7 +35,7 @@ impl Protocol {
     /// Whether `other` may not be used for the trial `name` of `subject`: motion made of a recording is left out with it.
     pub fn leaves_out(self, name: &str, subject: &str, other: &ClipInfo) -> bool {
         match self {
-            Self::TrialOut => trial_of(&other.name) == trial_of(name),
+            Self::TrialOut => trial_name(&other.name) == trial_name(name),
             Self::SubjectOut => other.subject == subject,
             Self::TrialIn => false,
         }
@@ -44,7 +44,7 @@ impl Protocol {
     /// Whether the same is left out for both trials.
     pub fn leaves_out_the_same(self, a: &Clip, b: &Clip) -> bool {
         match self {
-            Self::TrialOut => trial_of(&a.name) == trial_of(&b.name),
+            Self::TrialOut => trial_name(&a.name) == trial_name(&b.name),
             Self::SubjectOut => a.subject == b.subject,
             Self::TrialIn => true,
         }

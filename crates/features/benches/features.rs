@@ -4,7 +4,7 @@
 mod textured;
 
 use divan::Bencher;
-use features::{Detector, FeatureTracker, Options, match_features};
+use features::{Detector, FrameMatcher, Options, match_features};
 use model::{Image, Silhouette};
 use textured::{Change, NONE, picture};
 
@@ -36,21 +36,21 @@ fn detect_400_of_400_x_800(bencher: Bencher) {
 #[divan::bench]
 fn match_400_with_400(bencher: Bencher) {
     let options = Options::default();
-    let of = |shift: f64| {
+    let seen = |shift: f64| {
         let (image, inside) = person([1004, 1004], [400, 800], shift);
         Detector::default().detect(&image, &inside, &options)
     };
-    let (before, now) = (of(0.0), of(9.0));
+    let (before, now) = (seen(0.0), seen(9.0));
     bencher.bench_local(|| match_features(&before, &now, &options));
 }
 
 #[divan::bench]
 fn a_frame_of_1920_x_1080(bencher: Bencher) {
     let frames = [0.0, 9.0].map(|shift| person([1920, 1080], [500, 1000], shift));
-    let mut tracker = FeatureTracker::new(Options::default());
+    let mut matcher = FrameMatcher::new(Options::default());
     let mut index = 0;
     bencher.bench_local(|| {
         index += 1;
-        tracker.push(&frames[index % 2].0, &frames[index % 2].1)
+        matcher.push(&frames[index % 2].0, &frames[index % 2].1)
     });
 }

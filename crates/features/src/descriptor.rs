@@ -123,15 +123,15 @@ impl WithSimd for Sum<'_> {
                 let whole = turns[i] as usize;
                 let turn = turns[i] - whole as f32;
                 let directions = [whole % DIRECTIONS, (whole + 1) % DIRECTIONS];
-                for (v, of_row) in [(place, weight * (1.0 - share)), (place + 1, weight * share)] {
-                    let length = of_row * lengths[i];
+                for (v, row_weight) in [(place, weight * (1.0 - share)), (place + 1, weight * share)] {
+                    let length = row_weight * lengths[i];
                     let column = grid.places[i];
-                    for (u, of_both) in
+                    for (u, cell_weight) in
                         [(column, (1.0 - grid.shares[i]) * length), (column + 1, grid.shares[i] * length)]
                     {
                         let bins = &mut bins[v][u];
-                        bins[directions[0]] += of_both * (1.0 - turn);
-                        bins[directions[1]] += of_both * turn;
+                        bins[directions[0]] += cell_weight * (1.0 - turn);
+                        bins[directions[1]] += cell_weight * turn;
                     }
                 }
             }

@@ -105,9 +105,9 @@ impl Detector {
             .extrema
             .iter()
             .map(|extremum| {
-                let of_square = &mut taken[square(extremum)];
-                *of_square += 1;
-                (*of_square, *extremum)
+                let in_square = &mut taken[square(extremum)];
+                *in_square += 1;
+                (*in_square, *extremum)
             })
             .collect();
         ranked.sort_by_key(|(rank, _)| *rank);

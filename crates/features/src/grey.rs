@@ -107,10 +107,10 @@ impl Grey {
 
 /// Mean of a block of pixels.
 fn mean(image: &Image, left: usize, top: usize, block: usize) -> f32 {
-    let of_row = |y: usize| -> f32 {
+    let row_sum = |y: usize| -> f32 {
         image.row(y)[3 * left..3 * (left + block)].as_chunks::<3>().0.iter().map(luminance).sum()
     };
-    (top..top + block).map(of_row).sum::<f32>() / (block * block) as f32
+    (top..top + block).map(row_sum).sum::<f32>() / (block * block) as f32
 }
 
 /// 1 where the person is.

@@ -2,7 +2,7 @@
 
 mod textured;
 
-use features::{Feature, FeatureTracker, Features, Options, detect, match_features};
+use features::{Feature, Features, FrameMatcher, Options, detect, match_features};
 use model::{Image, Silhouette};
 use nalgebra::Vector2;
 use textured::{Change, NONE, picture};
@@ -148,7 +148,7 @@ fn the_strongest_features_are_spread_over_the_person() {
 
 #[test]
 fn a_stream_of_pictures_gives_the_points_of_neighbours() {
-    let mut tracker = FeatureTracker::new(Options::default());
+    let mut matcher = FrameMatcher::new(Options::default());
     for frame in 0..4 {
         let at = |frame: f64| Change {
             turn: 0.05 * frame,
@@ -157,7 +157,7 @@ fn a_stream_of_pictures_gives_the_points_of_neighbours() {
             ..NONE
         };
         let (image, inside) = picture(SIZE, at(f64::from(frame)), frame as u64);
-        let matches = tracker.push(&image, &inside);
+        let matches = matcher.push(&image, &inside);
         if frame == 0 {
             assert!(matches.is_empty());
             continue;

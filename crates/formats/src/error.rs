@@ -74,7 +74,7 @@ impl Error {
         Self::Unexpected { place: Place::Line(line), found: found.into(), expected: expected.into() }
     }
 
-    pub(crate) fn of_file(found: impl Into<String>, expected: impl Into<String>) -> Self {
+    pub(crate) fn whole_file(found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self::Unexpected { place: Place::File, found: found.into(), expected: expected.into() }
     }
 

@@ -129,7 +129,7 @@ fn check_size((width, height): (u32, u32), limits: &Limits) -> Result<[u32; 2]> 
         return Ok([width, height]);
     }
     let expected = format!("1 to {} pixels a side, {} in all", limits.side, limits.pixels);
-    Err(Error::of_file(format!("a picture of {width} x {height} pixels"), expected))
+    Err(Error::whole_file(format!("a picture of {width} x {height} pixels"), expected))
 }
 
 fn damaged(error: ImageError) -> Error {

@@ -41,7 +41,7 @@ pub fn read(bytes: &[u8]) -> Result<Array> {
     let wrong = |what: &str, expected: &str| {
         at_byte(start as u64, format!("{what} in the header {}", quote(header.as_bytes())), expected)
     };
-    let kind = field(&header, "descr").and_then(Kind::of);
+    let kind = field(&header, "descr").and_then(Kind::from_descr);
     let kind =
         kind.ok_or_else(|| wrong("no such descr", "integers or floats of 1 to 8 bytes, such as '<f4'"))?;
     let is_fortran = match field(&header, "fortran_order") {
@@ -71,7 +71,7 @@ impl Array {
         if self.shape.last() == Some(&3) && self.shape.len() > 1 {
             Ok(self.values.chunks_exact(3).map(nalgebra::Vector3::from_column_slice).collect())
         } else {
-            Err(Error::of_file(format!("an array of shape {:?}", self.shape), "a last dimension of 3"))
+            Err(Error::whole_file(format!("an array of shape {:?}", self.shape), "a last dimension of 3"))
         }
     }
 }
@@ -102,7 +102,7 @@ struct Kind {
 }
 
 impl Kind {
-    fn of(descr: &str) -> Option<Self> {
+    fn from_descr(descr: &str) -> Option<Self> {
         let [order, letter, digit] = descr.as_bytes() else { return None };
         let bytes = usize::from(digit.checked_sub(b'0')?);
         let is_known = match letter {
@@ -181,7 +181,7 @@ fn from_fortran(shape: &[usize], values: &[f64]) -> Vec<f64> {
 /// If there are not as many values as the shape needs.
 pub fn write_f32(shape: &[usize], values: &[f32]) -> Result<Vec<u8>> {
     if shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) != Some(values.len()) {
-        return Err(Error::of_file(format!("{} values", values.len()), format!("those of {shape:?}")));
+        return Err(Error::whole_file(format!("{} values", values.len()), format!("those of {shape:?}")));
     }
     let sides: String = shape.iter().map(|side| format!("{side}, ")).collect();
     let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({sides}), }}");
@@ -191,7 +191,7 @@ pub fn write_f32(shape: &[usize], values: &[f32]) -> Result<Vec<u8>> {
     }
     header.push('\n');
     let length = u16::try_from(header.len())
-        .map_err(|_| Error::of_file(format!("{} dimensions", shape.len()), "fewer dimensions"))?;
+        .map_err(|_| Error::whole_file(format!("{} dimensions", shape.len()), "fewer dimensions"))?;
     let mut bytes = MAGIC.to_vec();
     bytes.extend([1, 0]);
     bytes.extend(length.to_le_bytes());

@@ -32,7 +32,7 @@ pub fn read(bytes: &[u8]) -> Result<Read<Mesh>> {
         }
     }
     if mesh.vertices.is_empty() {
-        return Err(Error::of_file("no vertex", "lines that begin with v"));
+        return Err(Error::whole_file("no vertex", "lines that begin with v"));
     }
     if polygons > 0 {
         let message = format!("{polygons} faces of more than three corners became triangles");

@@ -56,7 +56,7 @@ pub fn read_with(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTraj
     let mut lines = Lines::new(bytes);
     let mut content = std::iter::from_fn(|| lines.find(|line| !line.text.is_empty() && line.text[0] != b'#'));
     let Some(header) = content.next() else {
-        return Err(Error::of_file("no line", "a header: time and three columns for each point"));
+        return Err(Error::whole_file("no line", "a header: time and three columns for each point"));
     };
     let separator = separator(header.text);
     let (columns, names) = columns(header, separator, &mut warnings)?;

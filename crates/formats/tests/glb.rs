@@ -93,13 +93,13 @@ fn a_mesh_is_read_back_by_another_library() {
 fn a_skeleton_with_skin_and_motion_is_read_back_by_another_library() {
     let bytes = glb::write_skinned("body", &body(), Some(&animation())).unwrap();
     let (document, buffers, _) = gltf::import_slice(&bytes).unwrap();
-    let of = |buffer: gltf::Buffer<'_>| Some(&*buffers[buffer.index()].0);
+    let bytes = |buffer: gltf::Buffer<'_>| Some(&*buffers[buffer.index()].0);
     let skin = document.skins().next().unwrap();
     let names: Vec<_> = skin.joints().map(|joint| joint.name().unwrap().to_owned()).collect();
     assert_eq!(names, ["hips", "spine", "head"]);
     assert_eq!(skin.joints().next().unwrap().children().next().unwrap().name(), Some("spine"));
     // a joint's place times its inverse bind matrix is the identity in the rest pose
-    let reader = skin.reader(of);
+    let reader = skin.reader(bytes);
     for (matrix, joint) in reader.read_inverse_bind_matrices().unwrap().zip(body().joints) {
         let place = joint.rest_position;
         assert_eq!(matrix[3], [-place.x as f32, -place.y as f32, -place.z as f32, 1.0]);
@@ -111,7 +111,7 @@ fn a_skeleton_with_skin_and_motion_is_read_back_by_another_library() {
         assert_eq!((place, rotation), (expected.rest_position, [0.0, 0.0, 0.0, 1.0]));
     }
     let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
-    let reader = primitive.reader(of);
+    let reader = primitive.reader(bytes);
     let joints: Vec<_> = reader.read_joints(0).unwrap().into_u16().collect();
     let weights: Vec<_> = reader.read_weights(0).unwrap().into_f32().collect();
     assert_eq!((joints[0], weights[0]), ([0; 4], [1.0, 0.0, 0.0, 0.0]));
@@ -123,7 +123,7 @@ fn a_skeleton_with_skin_and_motion_is_read_back_by_another_library() {
     assert_eq!(animation.channels().count(), 4);
     let spine = animation.channels().nth(2).unwrap();
     assert_eq!(spine.target().node().name(), Some("spine"));
-    let reader = spine.reader(of);
+    let reader = spine.reader(bytes);
     assert_eq!(reader.read_inputs().unwrap().collect::<Vec<_>>(), [0.0, 0.5, 1.0]);
     let gltf::animation::util::ReadOutputs::Rotations(rotations) = reader.read_outputs().unwrap() else {
         panic!("rotations")
@@ -132,7 +132,7 @@ fn a_skeleton_with_skin_and_motion_is_read_back_by_another_library() {
     assert!((rotations[2][2] - (PI / 4.0).sin() as f32).abs() < 1e-6);
     assert!(rotations.iter().all(|rotation| rotation[3] > 0.0), "the short way: {rotations:?}");
     let root = animation.channels().next().unwrap();
-    let gltf::animation::util::ReadOutputs::Translations(places) = root.reader(of).read_outputs().unwrap()
+    let gltf::animation::util::ReadOutputs::Translations(places) = root.reader(bytes).read_outputs().unwrap()
     else {
         panic!("translations")
     };

@@ -153,18 +153,18 @@ fn array(header: &str, data: &[u8]) -> Vec<u8> {
 
 #[test]
 fn arrays_of_every_kind_of_number_are_read() {
-    let of = |descr: &str, data: &[u8]| {
+    let parsed = |descr: &str, data: &[u8]| {
         let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (2,), }}\n");
         npy::read(&array(&header, data)).unwrap().values
     };
-    assert_eq!(of("<i2", &[0xfe, 0xff, 1, 0]), [-2.0, 1.0]);
-    assert_eq!(of(">u2", &[0xff, 0xfe, 1, 0]), [65_534.0, 256.0]);
-    assert_eq!(of("|i1", &[0xff, 3]), [-1.0, 3.0]);
-    assert_eq!(of("|b1", &[1, 0]), [1.0, 0.0]);
-    assert_eq!(of("<f2", &[0x00, 0x3c, 0x00, 0xc1]), [1.0, -2.5]);
-    assert_eq!(of("<f4", &[0, 0, 0x20, 0x41, 0, 0, 0, 0]), [10.0, 0.0]);
-    assert_eq!(of(">f8", &[0x40, 0x24, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]), [10.0, 0.0]);
-    assert_eq!(of("<i8", &[0xff; 16]), [-1.0, -1.0]);
+    assert_eq!(parsed("<i2", &[0xfe, 0xff, 1, 0]), [-2.0, 1.0]);
+    assert_eq!(parsed(">u2", &[0xff, 0xfe, 1, 0]), [65_534.0, 256.0]);
+    assert_eq!(parsed("|i1", &[0xff, 3]), [-1.0, 3.0]);
+    assert_eq!(parsed("|b1", &[1, 0]), [1.0, 0.0]);
+    assert_eq!(parsed("<f2", &[0x00, 0x3c, 0x00, 0xc1]), [1.0, -2.5]);
+    assert_eq!(parsed("<f4", &[0, 0, 0x20, 0x41, 0, 0, 0, 0]), [10.0, 0.0]);
+    assert_eq!(parsed(">f8", &[0x40, 0x24, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]), [10.0, 0.0]);
+    assert_eq!(parsed("<i8", &[0xff; 16]), [-1.0, -1.0]);
     let fortran = "{'descr': '|u1', 'fortran_order': True, 'shape': (2, 3)}";
     let read = npy::read(&array(fortran, &[0, 3, 1, 4, 2, 5])).unwrap();
     assert_eq!(read.values, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);

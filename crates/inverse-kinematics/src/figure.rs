@@ -63,9 +63,9 @@ impl Figure {
     /// If the root does not have three translations and three rotations.
     pub fn skeleton(skeleton: &Arc<Skeleton>, measured: &[ControlPoint]) -> Result<Self> {
         let joints = skeleton.joints();
-        let at_joint = |(joint, of): (usize, &model::Joint)| ControlPoint {
-            name: of.name.clone(),
-            joint,
+        let at_joint = |(index, joint): (usize, &model::Joint)| ControlPoint {
+            name: joint.name.clone(),
+            joint: index,
             offset: Vector3::zeros(),
         };
         let points: Vec<_> =

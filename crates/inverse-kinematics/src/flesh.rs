@@ -22,7 +22,7 @@ pub fn along(model: &BodyModel, shape: &Shape, joint: usize, bone: &Vector3<f64>
     let at = |share: f64| {
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for (vertex, position) in shape.vertices.iter().enumerate() {
-            let own = model.skin().influences(vertex).filter(|(of, _)| *of == joint);
+            let own = model.skin().influences(vertex).filter(|(influencing, _)| *influencing == joint);
             let weight: f64 = own.map(|(_, weight)| weight).sum();
             let from_joint = position - shape.joints[joint];
             let along = from_joint.dot(bone) / bone.norm_squared();

@@ -99,10 +99,10 @@ impl RigChain {
         let limbs = Limb::for_joints(rig);
         let is_twist = |&place: &usize| {
             let dof = &rig.dofs()[rig_dofs[place]];
-            let of_joint = |&&d: &&usize| rig.dofs()[d].joint == dof.joint;
-            let is_last = rig_dofs[place + 1..].iter().find(of_joint).is_none();
+            let same_joint = |&&d: &&usize| rig.dofs()[d].joint == dof.joint;
+            let is_last = rig_dofs[place + 1..].iter().find(same_joint).is_none();
             // the last of several rotations of an upper arm or thigh
-            is_last && rig_dofs[..place].iter().any(|d| of_joint(&d)) && limbs[dof.joint] != Limb::Torso
+            is_last && rig_dofs[..place].iter().any(|d| same_joint(&d)) && limbs[dof.joint] != Limb::Torso
         };
         let twists = (0..rig_dofs.len()).filter(is_twist).map(|place| place + ROOT_DOFS).collect();
         Ok(Self { chain, root: shape.joints[0], rig_dofs, twists })

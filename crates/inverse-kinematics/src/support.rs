@@ -42,7 +42,7 @@ impl Support {
     ///
     /// # Panics
     /// If the silhouette is wider or higher than 32,768 pixels.
-    pub fn of_silhouette(
+    pub fn from_silhouette(
         silhouette: &Silhouette,
         camera: &Camera,
         place: &Vector3<f64>,
@@ -51,7 +51,7 @@ impl Support {
         Self::seen_at(Arc::new(DistanceField::new(silhouette, 1)), camera, place, width)
     }
 
-    /// As [`of_silhouette`](Self::of_silhouette), from distances that several supports share.
+    /// As [`from_silhouette`](Self::from_silhouette), from distances that several supports share.
     pub fn seen_at(
         field: Arc<DistanceField>,
         camera: &Camera,

@@ -263,11 +263,11 @@ fn heading_and_tilt(rotation: &Matrix3<f64>) -> (f64, Vector3<f64>) {
 }
 
 fn translations(skeleton: &Skeleton) -> Vec<Vec<(usize, Axis)>> {
-    let of_joint = |j: usize| {
+    let joint_translations = |j: usize| {
         let channels = skeleton.dofs(j).zip(&skeleton.joints()[j].channels);
         channels.filter(|(_, c)| c.kind == ChannelKind::Translation).map(|(dof, c)| (dof, c.axis)).collect()
     };
-    (0..skeleton.num_joints()).map(of_joint).collect()
+    (0..skeleton.num_joints()).map(joint_translations).collect()
 }
 
 fn channel_angles(skeleton: &Skeleton, j: usize) -> JointRotation {

@@ -112,8 +112,8 @@ fn complete_somewhere(
 fn own_sigma(point: Option<f64>, markers: impl Iterator<Item = (Option<f64>, f64)>) -> f64 {
     let known = markers.filter_map(|(sigma, w)| Some((sigma? * w, w)));
     let (sum, weight) = known.fold((0.0, 0.0), |(sum, all), (s, w)| (sum + s, all + w));
-    let of_markers = if weight > 0.0 { Some(sum / weight) } else { None };
-    match (point, of_markers) {
+    let from_markers = if weight > 0.0 { Some(sum / weight) } else { None };
+    match (point, from_markers) {
         (Some(a), Some(b)) => f64::hypot(a, b),
         (a, b) => a.or(b).unwrap_or(f64::NAN),
     }

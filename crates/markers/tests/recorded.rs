@@ -69,7 +69,7 @@ fn sidedness(file: &PointTrajectories, mapped: &Mapped, pelvis: [&str; 3], pair:
     let marker = |name: &str| file.point_index(name).unwrap();
     let [left, right, back] = pelvis.map(marker);
     let t = &mapped.trajectories;
-    let [of_left, of_right] = pair.map(|p| t.point_index(p).unwrap());
+    let [left_point, right_point] = pair.map(|p| t.point_index(p).unwrap());
     let mut sum = 0.0;
     let mut count = 0;
     for f in 0..t.num_frames() {
@@ -78,7 +78,7 @@ fn sidedness(file: &PointTrajectories, mapped: &Mapped, pelvis: [&str; 3], pair:
         else {
             continue;
         };
-        let (Some(p), Some(q)) = (t.position(f, of_left), t.position(f, of_right)) else { continue };
+        let (Some(p), Some(q)) = (t.position(f, left_point), t.position(f, right_point)) else { continue };
         let forward = (l + r) / 2.0 - b;
         let to_left = Vector3::y().cross(&forward).normalize();
         sum += (p - q).dot(&to_left);

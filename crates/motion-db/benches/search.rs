@@ -71,7 +71,7 @@ fn search(bencher: Bencher, poses: usize, with_controls: bool, fast: bool) {
         .map(|t| {
             index.query_features(&[frames[t - 1], frames[t - 2]], &mut scratch, &mut features);
             points.positions(&kinematics, frames[t], &mut state, &mut positions);
-            let frame = HeadingFrame::of(frames[t - 1]);
+            let frame = HeadingFrame::from_coordinates(frames[t - 1]);
             let local = positions.iter().flat_map(|p| {
                 let local: [f64; 3] = (frame.local_from_world(p) * 100.0).into();
                 local.map(|v| v as f32)

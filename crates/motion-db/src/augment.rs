@@ -5,7 +5,7 @@ use crate::{Clip, Error, Result, mirror};
 /// Motion made of recorded motion, to be indexed beside it.
 ///
 /// Every clip comes in all combinations: as it was and mirrored, as fast as it was and at every speed of `speeds`. A
-/// variant is named after its clip, `16_15~mirror`, `16_15~x0.8`, `16_15~mirror~x0.8`; see [`trial_of`].
+/// variant is named after its clip, `16_15~mirror`, `16_15~x0.8`, `16_15~mirror~x0.8`; see [`trial_name`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Augment {
     /// whether left and right are exchanged, see [`mirror`]
@@ -21,7 +21,7 @@ const VARIANT: char = '~';
 
 /// Name of the trial that a clip was made of: `16_15` of `16_15~mirror~x0.8`. Whoever leaves a trial out leaves out all
 /// that was made of it.
-pub fn trial_of(clip: &str) -> &str {
+pub fn trial_name(clip: &str) -> &str {
     clip.split(VARIANT).next().unwrap_or(clip)
 }
 

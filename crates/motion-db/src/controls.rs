@@ -23,9 +23,9 @@ pub struct ControlTable {
     /// its clip, `[rows, 3·points·(1 + frames around) + 1]`
     pub(crate) relative: Blocks,
     /// means of `relative` over the rows of each segment of the index, shape `[segments, 3·points + 1]`
-    of_segments: Vec<f32>,
+    by_segment: Vec<f32>,
     /// means of those over the segments of each list, and the least unlikeness, shape `[lists, 3·points + 1]`
-    of_lists: Vec<f32>,
+    by_list: Vec<f32>,
 }
 
 fn segment_controls(relative: &Blocks, segments: &Segments, num_rows: usize) -> Vec<f32> {
@@ -43,13 +43,13 @@ fn segment_controls(relative: &Blocks, segments: &Segments, num_rows: usize) -> 
     means
 }
 
-fn list_controls(of_segments: &[f32], dims: usize, segments: &Segments) -> Vec<f32> {
+fn list_controls(by_segment: &[f32], dims: usize, segments: &Segments) -> Vec<f32> {
     let mut means = vec![0.0; segments.lists.len() * dims];
     for (list, mean) in means.chunks_exact_mut(dims).enumerate() {
         let range = segments.lists.segments(list);
         let share = 1.0 / range.len().max(1) as f32;
         let mut least = f32::INFINITY;
-        for numbers in range.map(|s| &of_segments[s * dims..][..dims]) {
+        for numbers in range.map(|s| &by_segment[s * dims..][..dims]) {
             mean.iter_mut().zip(numbers).for_each(|(mean, v)| *mean += share * v);
             least = least.min(numbers[dims - 1]);
         }
@@ -114,7 +114,7 @@ impl ControlTable {
         let width = 3 * num_points * (1 + around.len());
         let relative = Blocks::new(index.num_rows(), width + 1, |row, out| {
             let target = index.target(row);
-            let number = database.clip_of(target);
+            let number = database.clip_at(target);
             out[width] = unlikeness[number] as f32;
             let clip = &database.clips()[number];
             let last = clip.first_pose + clip.num_poses - 1;
@@ -128,24 +128,24 @@ impl ControlTable {
                 }
             }
         });
-        let (of_segments, of_lists) = index.segments.as_ref().map_or_else(Default::default, |segments| {
-            let of_segments = segment_controls(&relative, segments, index.num_rows());
-            let of_lists = list_controls(&of_segments, relative.dims(), segments);
-            (of_segments, of_lists)
+        let (by_segment, by_list) = index.segments.as_ref().map_or_else(Default::default, |segments| {
+            let by_segment = segment_controls(&relative, segments, index.num_rows());
+            let by_list = list_controls(&by_segment, relative.dims(), segments);
+            (by_segment, by_list)
         });
-        Self { points: num_points, unlikeness, world, relative, of_segments, of_lists }
+        Self { points: num_points, unlikeness, world, relative, by_segment, by_list }
     }
 
     /// Squared, weighted distance of `controls` from the middle of a segment's.
     #[inline(always)]
     pub(crate) fn segment_distance(&self, segment: usize, controls: &[f32], weights: &[f32]) -> f32 {
-        weighted_distance(&self.of_segments[segment * self.relative.dims()..], controls, weights)
+        weighted_distance(&self.by_segment[segment * self.relative.dims()..], controls, weights)
     }
 
     /// Squared, weighted distance of `controls` from the middle of a list's.
     #[inline(always)]
     pub(crate) fn list_distance(&self, list: usize, controls: &[f32], weights: &[f32]) -> f32 {
-        weighted_distance(&self.of_lists[list * self.relative.dims()..], controls, weights)
+        weighted_distance(&self.by_list[list * self.relative.dims()..], controls, weights)
     }
 
     /// Number of points P.

@@ -109,13 +109,13 @@ impl MotionDatabase {
         for (out, &v) in out.iter_mut().zip(self.pose(pose)) {
             *out = f64::from(v);
         }
-        for (out, &o) in out.iter_mut().zip(&self.clips[self.clip_of(pose)].zero_pose) {
+        for (out, &o) in out.iter_mut().zip(&self.clips[self.clip_at(pose)].zero_pose) {
             *out -= f64::from(o);
         }
     }
 
     /// Index of the clip that holds a pose.
-    pub fn clip_of(&self, pose: usize) -> usize {
+    pub fn clip_at(&self, pose: usize) -> usize {
         self.clips.partition_point(|c| c.first_pose + c.num_poses <= pose)
     }
 }

@@ -147,14 +147,14 @@ impl Ask<'_> {
     fn add_along_graph(&self, scratch: &mut FastScratch) {
         let stamp = scratch.age;
         for &row in self.query.hints {
-            if let Some(segment) = self.segments.of_row(row) {
+            if let Some(segment) = self.segments.segment_at(row) {
                 self.add(segment, stamp, scratch);
             }
         }
         for i in 0..scratch.found.len() {
             let segment = number(scratch.found[i]);
             let after = self.segments.first[segment] as usize + self.segments.length[segment] as usize;
-            if let Some(next) = self.segments.of_row(after) {
+            if let Some(next) = self.segments.segment_at(after) {
                 self.add(next, stamp, scratch);
             }
             for &near in &self.segments.graph[segment * DEGREE..][..DEGREE] {
@@ -237,7 +237,7 @@ impl WithSimd for FastSearch<'_, '_> {
             index.look_into(&ask, k, tracking.segments, scratch, out);
             let age = scratch.fast.age;
             let is_on_the_way =
-                |n: &&Neighbour| segments.of_row(n.row).is_some_and(|s| scratch.fast.seen[s] == age);
+                |n: &&Neighbour| segments.segment_at(n.row).is_some_and(|s| scratch.fast.seen[s] == age);
             if LOST_PART * out.iter().filter(is_on_the_way).count() >= k {
                 return Way::Tracked;
             }

@@ -24,7 +24,7 @@ impl HeadingFrame {
     }
 
     /// The frame of a pose in smooth coordinates, shape `[dofs]`.
-    pub fn of(coordinates: &[f64]) -> Self {
+    pub fn from_coordinates(coordinates: &[f64]) -> Self {
         Self::new(coordinates[0], coordinates[2], coordinates[HEADING])
     }
 

@@ -29,7 +29,7 @@ mod start_scan;
 mod threads;
 mod window;
 
-pub use augment::{Augment, trial_of, warp};
+pub use augment::{Augment, trial_name, warp};
 pub use build::{Clip, SkeletonSize, resample};
 pub use controls::ControlTable;
 pub use database::{ClipInfo, FRAME_RATE, MotionDatabase};

@@ -34,7 +34,7 @@ impl MotionDatabase {
     /// # Errors
     /// If the coordinates are others, or there are too many poses.
     pub fn append_from(&mut self, other: &Self, clip: usize, name: &str) -> Result<()> {
-        if !self.has_coordinates_of(other) {
+        if !self.has_same_coordinates_as(other) {
             return Err(Error::OtherCoordinates);
         }
         let mut info = other.clips[clip].clone();
@@ -68,7 +68,7 @@ impl MotionDatabase {
     }
 
     /// Whether the same numbers mean the same pose in both.
-    pub fn has_coordinates_of(&self, other: &Self) -> bool {
+    pub fn has_same_coordinates_as(&self, other: &Self) -> bool {
         self.skeleton == other.skeleton
             && self.references == other.references
             && self.leg_length == other.leg_length

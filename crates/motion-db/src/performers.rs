@@ -67,19 +67,19 @@ impl MotionDatabase {
     /// Index of the performer of every clip, and their number: clips of one skeleton are one performer's.
     pub fn performers(&self) -> (Vec<usize>, usize) {
         let mut first: Vec<&[f64]> = Vec::new();
-        let mut of_clip = Vec::with_capacity(self.clips.len());
+        let mut by_clip = Vec::with_capacity(self.clips.len());
         for clip in &self.clips {
             let is_same = |other: &&[f64]| {
                 other.iter().zip(&clip.proportions).all(|(a, b)| (a - b).abs() < SAME_SKELETON_M)
             };
             let found = first.iter().position(is_same);
-            of_clip.push(found.unwrap_or(first.len()));
+            by_clip.push(found.unwrap_or(first.len()));
             if found.is_none() {
                 first.push(&clip.proportions);
             }
         }
         let count = first.len();
-        (of_clip, count)
+        (by_clip, count)
     }
 
     /// Learns the zero pose of every performer and keeps it with their clips: from then on, poses, windows and searches are
@@ -88,15 +88,15 @@ impl MotionDatabase {
     /// Poses are matched with the most similar ones of every other performer. Offsets `o` are chosen to make the
     /// differences of matched poses small, `Σ w ‖(q_i − o_p) − (q_j − o_r)‖² + λ Σ‖o_p‖²`, and the poses matched again.
     pub fn learn_zero_poses(&mut self) {
-        let (of_clip, count) = self.performers();
+        let (by_clip, count) = self.performers();
         if count < MIN_PERFORMERS {
             self.clips.iter_mut().for_each(|c| c.zero_pose.clear());
             return;
         }
-        let scale = FeatureScale::of(self);
+        let scale = FeatureScale::from_database(self);
         let dofs = self.num_dofs();
         let free: Vec<bool> = (0..dofs).map(|d| d > HEADING && self.parametrisation.is_angle(d)).collect();
-        let mut samples = self.samples(&of_clip, count, &scale);
+        let mut samples = self.samples(&by_clip, count, &scale);
         let mut offsets = vec![vec![0.0; dofs]; count];
         for _ in 0..ROUNDS {
             for (samples, offset) in samples.iter_mut().zip(&offsets) {
@@ -108,26 +108,26 @@ impl MotionDatabase {
             }
             offsets = fit(&samples, &free);
         }
-        for (clip, performer) in self.clips.iter_mut().zip(of_clip) {
+        for (clip, performer) in self.clips.iter_mut().zip(by_clip) {
             let radians = offsets[performer].iter().zip(&scale.per_dof);
             clip.zero_pose = radians.map(|(o, s)| (o / s) as f32).collect();
         }
     }
 
     /// Recorded poses of every performer, evenly over their clips.
-    fn samples(&self, of_clip: &[usize], count: usize, scale: &FeatureScale) -> Vec<Vec<Sample>> {
+    fn samples(&self, by_clip: &[usize], count: usize, scale: &FeatureScale) -> Vec<Vec<Sample>> {
         let dofs = self.num_dofs();
         let mut poses = vec![0; count];
-        for (clip, &performer) in self.clips.iter().zip(of_clip) {
+        for (clip, &performer) in self.clips.iter().zip(by_clip) {
             poses[performer] += clip.num_poses;
         }
         let most = SAMPLES.min(MAX_SAMPLES / count).max(1);
         let mut samples: Vec<Vec<Sample>> = (0..count).map(|_| Vec::new()).collect();
         let double = |pose: usize| self.pose(pose).iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
-        for (clip, &performer) in self.clips.iter().zip(of_clip) {
+        for (clip, &performer) in self.clips.iter().zip(by_clip) {
             let stride = poses[performer].div_ceil(most);
             for pose in (clip.first_pose + LAG..clip.first_pose + clip.num_poses).step_by(stride) {
-                let frame = HeadingFrame::of(&double(pose));
+                let frame = HeadingFrame::from_coordinates(&double(pose));
                 let mut numbers = vec![0.0; 2 * dofs];
                 for (at, out) in [pose, pose - LAG].into_iter().zip(numbers.chunks_exact_mut(dofs)) {
                     frame.relative(&double(at), out);
@@ -145,13 +145,13 @@ impl MotionDatabase {
     pub fn zero_pose_prior(&self, skeleton: &Skeleton) -> ZeroPosePrior {
         let dofs = self.num_dofs();
         let own = proportions(skeleton);
-        let (of_clip, count) = self.performers();
+        let (by_clip, count) = self.performers();
         let mut mean = vec![0.0; dofs];
         let mut covariance = vec![0.0; dofs * dofs];
         let mut weights = 0.02;
         let mut known = None;
         for performer in 0..count {
-            let Some(clip) = of_clip.iter().position(|p| *p == performer).map(|c| &self.clips[c]) else {
+            let Some(clip) = by_clip.iter().position(|p| *p == performer).map(|c| &self.clips[c]) else {
                 continue;
             };
             if clip.zero_pose.is_empty() {

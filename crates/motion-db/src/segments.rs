@@ -44,7 +44,7 @@ pub(crate) struct Segments {
     pub first: Column<u32>,
     pub length: Column<u32>,
     /// segment of each row
-    pub of_row: Column<u32>,
+    pub by_row: Column<u32>,
     pub lists: Lists,
     /// segments near to each, see [`neighbour_graph`]
     pub graph: Column<u32>,
@@ -140,9 +140,9 @@ impl Cutter {
         let ordered = |all: &[u32]| order.iter().map(|&s| all[s as usize]).collect::<Vec<u32>>();
         let (first, length) = (ordered(&self.first), ordered(&self.length));
         let radius: Vec<f32> = order.iter().map(|&s| self.radius[s as usize]).collect();
-        let mut of_row = vec![0; self.next_row as usize];
+        let mut by_row = vec![0; self.next_row as usize];
         for (s, (first, length)) in first.iter().zip(&length).enumerate() {
-            of_row[*first as usize..(first + length) as usize].fill(s as u32);
+            by_row[*first as usize..(first + length) as usize].fill(s as u32);
         }
         let graph = neighbour_graph(&lead, &lists, threads);
         Some(Segments {
@@ -154,7 +154,7 @@ impl Cutter {
             radius: radius.into(),
             first: first.into(),
             length: length.into(),
-            of_row: of_row.into(),
+            by_row: by_row.into(),
             lists,
             graph: graph.into(),
         })
@@ -174,8 +174,8 @@ impl Segments {
     }
 
     /// The segment of a row, if there is such a row.
-    pub fn of_row(&self, row: usize) -> Option<usize> {
-        let segment = *self.of_row.get(row)? as usize;
+    pub fn segment_at(&self, row: usize) -> Option<usize> {
+        let segment = *self.by_row.get(row)? as usize;
         (segment < self.len()).then_some(segment)
     }
 

@@ -168,7 +168,7 @@ pub fn start_poses(
             break;
         }
         let is_distinct = |c: &StartPose| {
-            c.pose.abs_diff(pose) > DISTINCT_FRAMES || database.clip_of(c.pose) != database.clip_of(pose)
+            c.pose.abs_diff(pose) > DISTINCT_FRAMES || database.clip_at(c.pose) != database.clip_at(pose)
         };
         if chosen.iter().all(is_distinct) {
             chosen.push(observation.place(table, pose, squared.sqrt()));

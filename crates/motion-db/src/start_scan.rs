@@ -114,7 +114,7 @@ impl StartScan {
         self.best.clear();
         let count = if self.observation.len() < 2 { 0 } else { count };
         for &place in &places[..count] {
-            let index = database.clip_of(place);
+            let index = database.clip_at(place);
             let clip = &database.clips()[index];
             let range = self.range(clip.first_pose..clip.first_pose + clip.num_poses);
             let unlike = self.unlikeness(table, index);

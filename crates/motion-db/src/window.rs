@@ -27,7 +27,7 @@ pub struct FeatureScale {
 
 impl FeatureScale {
     /// Degrees and centimetres.
-    pub fn of(database: &MotionDatabase) -> Self {
+    pub fn from_database(database: &MotionDatabase) -> Self {
         let parametrisation = database.parametrisation();
         let scale = |dof| if parametrisation.is_angle(dof) { 180.0 / std::f64::consts::PI } else { 100.0 };
         Self { per_dof: (0..database.num_dofs()).map(scale).collect() }
@@ -36,7 +36,7 @@ impl FeatureScale {
     /// The features of the window `Q_{t,m}`: for i = 1 … m the pose of frame t − i relative to the heading frame of
     /// frame t − 1 (method §2, mend 1). `poses[i − 1]` is `q_{t−i}` in world coordinates; `out` has shape `[m · dofs]`.
     pub fn window_features(&self, poses: &[&[f64]], out: &mut [f64]) {
-        let frame = HeadingFrame::of(poses[0]);
+        let frame = HeadingFrame::from_coordinates(poses[0]);
         for (pose, out) in poses.iter().zip(out.chunks_exact_mut(self.per_dof.len())) {
             frame.relative(pose, out);
             self.scale(out);
@@ -113,7 +113,7 @@ impl WindowIndex {
         emit: &mut dyn FnMut(&[f32]) -> Result<()>,
     ) -> Result<Self> {
         check_window(database, window)?;
-        let scale = FeatureScale::of(database);
+        let scale = FeatureScale::from_database(database);
         let width = window * database.num_dofs();
         let (targets, clip_rows) = rows(database, window);
         let raw = RawWindows { database, scale: &scale, window };
@@ -171,7 +171,7 @@ impl WindowIndex {
     }
 
     /// The row whose target is `pose`, if it has a whole window before it.
-    pub fn row_of_target(&self, pose: usize) -> Option<usize> {
+    pub fn target_row(&self, pose: usize) -> Option<usize> {
         self.targets.binary_search(&(pose as u32)).ok()
     }
 
@@ -219,7 +219,7 @@ impl RawMemory {
 impl RawWindows<'_> {
     fn features<'m>(&self, target: usize, memory: &'m mut RawMemory) -> &'m mut [f64] {
         self.database.copy_pose(target - 1, &mut memory.newest);
-        let frame = HeadingFrame::of(&memory.newest);
+        let frame = HeadingFrame::from_coordinates(&memory.newest);
         let dofs = self.database.num_dofs();
         for (i, out) in (1..=self.window).zip(memory.features.chunks_exact_mut(dofs)) {
             self.database.copy_pose(target - i, &mut memory.pose);

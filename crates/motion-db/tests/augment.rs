@@ -5,7 +5,7 @@ mod fixtures;
 use fixtures::{drawn, recorded, with_skeleton};
 use kinematics::{Kinematics, Parametrisation};
 use model::Motion;
-use motion_db::{Augment, Clip, MotionDatabase, mirror, resample, trial_of, warp};
+use motion_db::{Augment, Clip, MotionDatabase, mirror, resample, trial_name, warp};
 use nalgebra::Vector3;
 use sample_motion::Action;
 
@@ -140,7 +140,7 @@ fn every_variant_is_indexed_under_its_own_name_and_knows_its_trial() {
     let names: std::collections::HashSet<&str> = all.iter().map(|c| c.name.as_str()).collect();
     assert_eq!((all.len(), names.len()), (12, 12));
     assert_eq!(all[0], clips[0]);
-    assert!(all[..6].iter().all(|c| trial_of(&c.name) == clips[0].name && c.subject == clips[0].subject));
+    assert!(all[..6].iter().all(|c| trial_name(&c.name) == clips[0].name && c.subject == clips[0].subject));
     let database = MotionDatabase::build(&all).unwrap();
     let poses = database.num_poses() as f64;
     assert!((poses / 180.0 - 6.1).abs() < 0.1, "{poses} poses");

@@ -183,8 +183,8 @@ fn a_window_that_no_clip_holds_is_refused() {
 fn every_pose_knows_its_clip() {
     let database = MotionDatabase::build(&fixtures::drawn_clips(33)).unwrap();
     for (i, clip) in database.clips().iter().enumerate() {
-        assert_eq!(database.clip_of(clip.first_pose), i);
-        assert_eq!(database.clip_of(clip.first_pose + clip.num_poses - 1), i);
+        assert_eq!(database.clip_at(clip.first_pose), i);
+        assert_eq!(database.clip_at(clip.first_pose + clip.num_poses - 1), i);
     }
 }
 

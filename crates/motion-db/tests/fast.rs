@@ -7,7 +7,7 @@ use std::collections::HashSet;
 use fixtures::{Numbers, Question, SIX, drawn, drawn_clips, questions, recorded};
 use kinematics::{PointSet, control_points};
 use motion_db::{
-    Augment, Clip, ControlTable, MotionDatabase, Neighbour, Query, Scratch, Way, WindowIndex, trial_of,
+    Augment, Clip, ControlTable, MotionDatabase, Neighbour, Query, Scratch, Way, WindowIndex, trial_name,
 };
 use sample_motion::Action;
 
@@ -211,7 +211,7 @@ fn tracking_takes_no_memory_once_it_has_run() {
 /// Where a window is, whatever index holds it.
 fn place(database: &MotionDatabase, index: &WindowIndex, row: usize) -> (String, usize) {
     let pose = index.target(row);
-    let clip = &database.clips()[database.clip_of(pose)];
+    let clip = &database.clips()[database.clip_at(pose)];
     (clip.name.clone(), pose - clip.first_pose)
 }
 
@@ -228,7 +228,7 @@ fn the_nearest_of_several_indexes_together_are_those_of_one() {
     // Trials are divided among three; each shard has principal axes of its own.
     let mut shards = [whole.emptied(), whole.emptied(), whole.emptied()];
     for (i, clip) in whole.clips().iter().enumerate() {
-        let shard = trial_of(&clip.name).len() + i / 7;
+        let shard = trial_name(&clip.name).len() + i / 7;
         shards[shard % 3].append_from(&whole, i, &clip.name).unwrap();
     }
     let shards = shards.map(|database| {
@@ -237,7 +237,7 @@ fn the_nearest_of_several_indexes_together_are_those_of_one() {
     });
     let motion = drawn(Action::Jump, 2, 77, 100).motion;
     let asked = questions(&whole, &index, &motion, 9);
-    let of_shards: Vec<Vec<Question>> =
+    let by_shard: Vec<Vec<Question>> =
         shards.iter().map(|(database, index)| questions(database, index, &motion, 9)).collect();
     let (mut scratch, mut found) = (Scratch::default(), Vec::new());
     for (q, question) in asked.iter().enumerate() {
@@ -245,7 +245,7 @@ fn the_nearest_of_several_indexes_together_are_those_of_one() {
         let expected: Vec<_> =
             found.iter().map(|n| (n.distance_squared, place(&whole, &index, n.row))).collect();
         let mut merged = Vec::new();
-        for ((database, index), asked) in shards.iter().zip(&of_shards) {
+        for ((database, index), asked) in shards.iter().zip(&by_shard) {
             index.nearest(&query(&asked[q], &[]), K, &mut scratch, &mut found);
             merged.extend(found.iter().map(|n| (n.distance_squared, place(database, index, n.row))));
         }

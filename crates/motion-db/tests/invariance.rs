@@ -88,7 +88,7 @@ fn features_keep_distances() {
         let pairs = index.features(row).iter().zip(index.features(0));
         let found: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
         assert!((found.sqrt() - expected.sqrt()).abs() < 1e-3, "row {row}");
-        assert_eq!(index.row_of_target(index.target(row)), Some(row));
+        assert_eq!(index.target_row(index.target(row)), Some(row));
     }
 }
 

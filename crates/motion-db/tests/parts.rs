@@ -33,7 +33,7 @@ fn what_does_not_belong_together_is_refused() {
     let clips = fixtures::drawn_clips(60);
     let whole = MotionDatabase::build(&clips).unwrap();
     let other = MotionDatabase::build(&clips[..3]).unwrap();
-    assert!(!whole.has_coordinates_of(&other));
+    assert!(!whole.has_same_coordinates_as(&other));
     assert_eq!(whole.emptied().append_from(&other, 0, "a"), Err(Error::OtherCoordinates));
     let mut odd = fixtures::drawn(Action::Walk, 1, 99, 60);
     odd.motion = fixtures::with_skeleton(&odd.motion, |joints| joints[1].name = "tail".to_owned());

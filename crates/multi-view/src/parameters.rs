@@ -126,7 +126,7 @@ impl Parameters {
     }
 
     /// The frames that pose and shape are found from, at most those before `end`.
-    pub fn frames_of_shape(&self, end: usize) -> Vec<usize> {
+    pub fn shape_fit_frames(&self, end: usize) -> Vec<usize> {
         let spread = end.saturating_sub(self.first_frame) / self.shape_frames;
         let step = self.shape_step.unwrap_or(spread).max(1);
         (0..self.shape_frames)
@@ -158,12 +158,12 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_the_shape_end_with_the_clip() {
+    fn shape_fit_frames_end_with_the_clip() {
         let spread = Parameters { first_frame: 5, shape_frames: 3, ..Parameters::default() };
-        assert_eq!(spread.frames_of_shape(305), [5, 105, 205]);
-        assert_eq!(spread.frames_of_shape(7), [5, 6]);
+        assert_eq!(spread.shape_fit_frames(305), [5, 105, 205]);
+        assert_eq!(spread.shape_fit_frames(7), [5, 6]);
         let parameters = Parameters { shape_step: Some(10), ..spread };
-        assert_eq!(parameters.frames_of_shape(100), [5, 15, 25]);
-        assert_eq!(parameters.frames_of_shape(16), [5, 15]);
+        assert_eq!(parameters.shape_fit_frames(100), [5, 15, 25]);
+        assert_eq!(parameters.shape_fit_frames(16), [5, 15]);
     }
 }

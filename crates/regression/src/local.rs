@@ -82,8 +82,8 @@ impl LocalRegression {
             }
             products[i] += sum;
         }
-        let of_mean: f64 = products.iter().zip(weights).map(|(p, w)| p * w).sum();
-        let of_query: f64 = self.kernel[..k].iter().zip(weights).map(|(p, w)| p * w).sum();
+        let mean_product: f64 = products.iter().zip(weights).map(|(p, w)| p * w).sum();
+        let query_product: f64 = self.kernel[..k].iter().zip(weights).map(|(p, w)| p * w).sum();
         out.mean.fill(0.0);
         dense::weighted_sum(examples.targets, dofs, weights, &mut out.mean);
         for (root, w) in self.roots.iter_mut().zip(weights) {
@@ -96,12 +96,12 @@ impl LocalRegression {
                 continue;
             }
             let root = self.roots[i];
-            let here = of_mean - products[i];
+            let here = mean_product - products[i];
             for ((g, p), other) in row[i..k].iter_mut().zip(&products[i..]).zip(&self.roots[i..]) {
                 *g = root * other * (*g - p + here);
             }
             row[i] += ridge;
-            row[at.kernel] = root * (self.kernel[i] - of_query + here);
+            row[at.kernel] = root * (self.kernel[i] - query_product + here);
             for ((t, y), m) in row[at.targets..].iter_mut().zip(examples.target(i)).zip(&out.mean) {
                 *t = root * (y - m);
             }

@@ -131,9 +131,9 @@ impl Model {
         let floors: Vec<f64> = tracks.iter().map(|(_, t)| t.floor_m).collect();
         let mut movements = Vec::new();
         for action in Action::ALL {
-            let of_action: Vec<_> = tracks.iter().filter(|(m, _)| m.action == action).collect();
-            if !of_action.is_empty() {
-                movements.extend(learn_action(action, &of_action)?);
+            let in_action: Vec<_> = tracks.iter().filter(|(m, _)| m.action == action).collect();
+            if !in_action.is_empty() {
+                movements.extend(learn_action(action, &in_action)?);
             }
         }
         Ok(Self { body, references, ball_m: quantile(&floors, 0.5), motions: motions.len(), movements })

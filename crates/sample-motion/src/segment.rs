@@ -57,8 +57,8 @@ pub(crate) fn describe(track: &Track, segment: &Segment, basis: Basis, phases: &
     let samples: Vec<[f64; CHANNELS]> = (0..SAMPLES).map(sample).collect();
     let mut coefficients = vec![0.0; basis.len()];
     for channel in 0..CHANNELS {
-        let of_channel: Vec<f64> = samples.iter().map(|row| row[channel]).collect();
-        basis.fit(&of_channel, &mut coefficients);
+        let channel_samples: Vec<f64> = samples.iter().map(|row| row[channel]).collect();
+        basis.fit(&channel_samples, &mut coefficients);
         numbers.extend_from_slice(&coefficients);
     }
     numbers

@@ -21,11 +21,11 @@ fn positions(motion: &Motion, names: &[&str]) -> Vec<Vec<Vector3<f64>>> {
     let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
     let joints: Vec<usize> = names.iter().map(|n| skeleton.joint_index(n).unwrap()).collect();
     let mut state: State = kinematics.state();
-    let of_frame = |pose: &[f64]| {
+    let frame_joints = |pose: &[f64]| {
         kinematics.update(pose, &mut state);
         joints.iter().map(|&j| state.positions[j]).collect()
     };
-    motion.poses().map(of_frame).collect()
+    motion.poses().map(frame_joints).collect()
 }
 
 #[test]

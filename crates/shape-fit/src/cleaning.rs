@@ -37,7 +37,7 @@ fn majority(silhouette: &Silhouette) -> Silhouette {
     let mut result = Silhouette::empty(width, height);
     let words = width.div_ceil(64);
     // sums of three neighbours in a row, as ones and twos
-    let of_row = |y: usize| -> Vec<(u64, u64)> {
+    let row_words = |y: usize| -> Vec<(u64, u64)> {
         let row = silhouette.row(y);
         let last = (width - 1) % 64;
         (0..words)
@@ -53,9 +53,9 @@ fn majority(silhouette: &Silhouette) -> Silhouette {
         return result;
     }
     let mask = if width % 64 == 0 { !0 } else { (1 << (width % 64)) - 1 };
-    let (mut above, mut here) = (of_row(0), of_row(0));
+    let (mut above, mut here) = (row_words(0), row_words(0));
     for y in 0..height {
-        let below = of_row((y + 1).min(height - 1));
+        let below = row_words((y + 1).min(height - 1));
         let row = result.row_mut(y);
         for i in 0..words {
             let ((a1, a2), (b1, b2), (c1, c2)) = (above[i], here[i], below[i]);

@@ -163,9 +163,9 @@ impl Term<'_> {
             *gradient += metric * miss * (weight * metres);
         };
         for (i, point) in rim.iter().enumerate() {
-            add(i as u32, scratch.matches.of_rim[i], point.length * rim_share * per_px);
+            add(i as u32, scratch.matches.by_rim[i], point.length * rim_share * per_px);
         }
-        for (at, &i) in scratch.matches.of_outline.iter().enumerate() {
+        for (at, &i) in scratch.matches.by_outline.iter().enumerate() {
             add(i, at as u32, outline.step_px * per_px);
         }
         energy
@@ -189,8 +189,8 @@ impl Term<'_> {
         let width = scratch.derivatives.len() / 2;
         for row in 0..2 {
             let along = by_point.row(row).transpose();
-            let of_both = scratch.derivatives[..width].iter().zip(&scratch.derivatives[width..]);
-            scratch.rows.extend(of_both.map(|(from, to)| 0.5 * along.dot(&(from + to))));
+            let both_ends = scratch.derivatives[..width].iter().zip(&scratch.derivatives[width..]);
+            scratch.rows.extend(both_ends.map(|(from, to)| 0.5 * along.dot(&(from + to))));
             scratch.rows.push(residual[row]);
         }
     }
@@ -259,8 +259,8 @@ mod tests {
             term.differentiate(point.vertices, &mut derivatives);
             for axis in 0..2 {
                 let along = by_point.row(axis).transpose();
-                let of_both = derivatives[..width].iter().zip(&derivatives[width..]);
-                jacobian.extend(of_both.map(|(from, to)| 0.5 * along.dot(&(from + to))));
+                let both_ends = derivatives[..width].iter().zip(&derivatives[width..]);
+                jacobian.extend(both_ends.map(|(from, to)| 0.5 * along.dot(&(from + to))));
             }
         }
         check_jacobian(&x, 2 * chosen.len(), &jacobian, 1e-4, |x, pixels| {

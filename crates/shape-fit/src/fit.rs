@@ -13,7 +13,7 @@ use crate::{
     contour_term::Weighting,
     observation::Observation,
     place::{Place, locate},
-    solver::{Problem, Stage, State},
+    solver::{Pass, Problem, State},
     start_poses::limb_dofs,
     starts::{Setting, Start, find_starts, sizes},
 };
@@ -24,22 +24,22 @@ const FITTED: usize = 6;
 const CONTENDERS: usize = 2;
 
 /// From far away: pose and size.
-const COARSE: [Stage; 3] =
-    [stage(0, 0.25, 0.5, 0.15, 1, 8), stage(0, 0.12, 0.3, 0.10, 3, 8), stage(0, 0.06, 0.1, 0.06, 6, 6)];
+const COARSE: [Pass; 3] =
+    [pass(0, 0.25, 0.5, 0.15, 1, 8), pass(0, 0.12, 0.3, 0.10, 3, 8), pass(0, 0.06, 0.1, 0.06, 6, 6)];
 /// To tell which start is right.
-const MIDDLE: [Stage; 2] = [stage(0, 0.04, 0.05, 0.05, 10, 12), stage(0, 0.03, 0.02, 0.04, 20, 10)];
+const MIDDLE: [Pass; 2] = [pass(0, 0.04, 0.05, 0.05, 10, 12), pass(0, 0.03, 0.02, 0.04, 20, 10)];
 /// To the end.
-const FINE: [Stage; 2] = [stage(1, 0.03, 0.02, 0.04, 20, 12), stage(1, 0.02, 0.01, 0.04, 20, 12)];
+const FINE: [Pass; 2] = [pass(1, 0.03, 0.02, 0.04, 20, 12), pass(1, 0.02, 0.01, 0.04, 20, 12)];
 
-const fn stage(
+const fn pass(
     level: usize,
     scale_m: f64,
     tangential: f64,
     normal_m: f64,
     components: usize,
     evaluations: usize,
-) -> Stage {
-    Stage { level, weighting: Weighting { scale_m, tangential, normal_m }, components, evaluations }
+) -> Pass {
+    Pass { level, weighting: Weighting { scale_m, tangential, normal_m }, components, evaluations }
 }
 
 /// A body found in the silhouettes of one frame.
@@ -144,7 +144,7 @@ pub fn fit_pose(
     let wanted = Wanted::Pose(&known);
     let found = frame.search(model, &topology, wanted, options);
     let problem = Problem { model, topology: &topology, frames: vec![frame.kept()], options: *options };
-    let (state, _) = problem.solve(found.state, &wanted.stages(&FINE));
+    let (state, _) = problem.solve(found.state, &wanted.passes(&FINE));
     frame.result(model, &topology, (&state.poses[0], &state.alpha), found.runner_up, options)
 }
 
@@ -158,10 +158,10 @@ enum Wanted<'a> {
 }
 
 impl Wanted<'_> {
-    /// Stages in which nothing moves but what is wanted.
-    fn stages(self, stages: &[Stage]) -> Vec<Stage> {
-        let components = |stage: &Stage| if matches!(self, Self::All) { stage.components } else { 0 };
-        stages.iter().map(|stage| Stage { components: components(stage), ..*stage }).collect()
+    /// Passes in which nothing moves but what is wanted.
+    fn passes(self, passes: &[Pass]) -> Vec<Pass> {
+        let components = |pass: &Pass| if matches!(self, Self::All) { pass.components } else { 0 };
+        passes.iter().map(|pass| Pass { components: components(pass), ..*pass }).collect()
     }
 
     /// Shapes that starts are tried with.
@@ -224,7 +224,7 @@ impl Frame {
     /// The best of several starts.
     fn search(&self, model: &BodyModel, topology: &Topology, wanted: Wanted<'_>, options: &Options) -> Found {
         let kept = self.kept();
-        let [coarse_stages, middle_stages] = [wanted.stages(&COARSE), wanted.stages(&MIDDLE)];
+        let [coarse_passes, middle_passes] = [wanted.passes(&COARSE), wanted.passes(&MIDDLE)];
         let alphas = wanted.alphas(model);
         let setting = Setting { model, topology, views: &kept, centre: self.place.centroid, alphas: &alphas };
         let mut starts = find_starts(&setting);
@@ -232,16 +232,16 @@ impl Frame {
         let problem = Problem { model, topology, frames: vec![kept.clone()], options: *options };
         let from = |start: &Start| {
             let state = State { poses: vec![start.pose.clone()], alpha: start.alpha.clone() };
-            problem.solve(state, &coarse_stages)
+            problem.solve(state, &coarse_passes)
         };
         let mut coarse: Vec<(State, f64)> = starts.par_iter().map(from).collect();
         coarse.sort_by(|a, b| a.1.total_cmp(&b.1));
         let twin = coarse.first().map(|(best, _)| twin(model, best));
         coarse.truncate(CONTENDERS);
         let mut contenders: Vec<State> = coarse.into_iter().map(|(state, _)| state).collect();
-        contenders.extend(twin.map(|twin| problem.solve(twin, &coarse_stages[1..]).0));
+        contenders.extend(twin.map(|twin| problem.solve(twin, &coarse_passes[1..]).0));
         let mut refined: Vec<(State, f64)> =
-            contenders.into_par_iter().map(|state| problem.solve(state, &middle_stages)).collect();
+            contenders.into_par_iter().map(|state| problem.solve(state, &middle_passes)).collect();
         refined.sort_by(|a, b| a.1.total_cmp(&b.1));
         let (state, energy) = refined.swap_remove(0);
         let others = refined.iter().filter(|(other, _)| faces_elsewhere(&state, other));

@@ -12,9 +12,9 @@ pub const NONE: u32 = u32::MAX;
 #[derive(Debug, Clone, Default)]
 pub struct Matches {
     /// point of the outline for every point of the rim, [`NONE`] if there are none, shape `[rim]`
-    pub of_rim: Vec<u32>,
+    pub by_rim: Vec<u32>,
     /// point of the rim for every point of the outline, shape `[outline]`
-    pub of_outline: Vec<u32>,
+    pub by_outline: Vec<u32>,
     rim: [Vec<f32>; 4],
     least: Vec<f32>,
     squared: Vec<f32>,
@@ -31,17 +31,17 @@ impl Matches {
         let count = rim.len();
         self.least.clear();
         self.least.resize(count, f32::INFINITY);
-        self.of_rim.clear();
-        self.of_rim.resize(count, NONE);
-        self.of_outline.clear();
+        self.by_rim.clear();
+        self.by_rim.resize(count, NONE);
+        self.by_outline.clear();
         self.squared.resize(count, 0.0);
         let rim = self.rim.each_ref().map(|numbers| &numbers[..count]);
-        let (least, of_rim) = (&mut self.least[..count], &mut self.of_rim[..count]);
+        let (least, by_rim) = (&mut self.least[..count], &mut self.by_rim[..count]);
         for (at, (pixel, normal)) in outline.pixels.iter().zip(&outline.normals).enumerate() {
             let point = key(*pixel, *normal, normal_px);
             let squared = &mut self.squared[..count];
-            let nearest = Arch::new().dispatch(Nearest { at: at as u32, point, rim, squared, least, of_rim });
-            self.of_outline.push(nearest);
+            let nearest = Arch::new().dispatch(Nearest { at: at as u32, point, rim, squared, least, by_rim });
+            self.by_outline.push(nearest);
         }
     }
 }
@@ -53,7 +53,7 @@ struct Nearest<'a> {
     rim: [&'a [f32]; 4],
     squared: &'a mut [f32],
     least: &'a mut [f32],
-    of_rim: &'a mut [u32],
+    by_rim: &'a mut [u32],
 }
 
 /// Numbers compared at a time.
@@ -65,17 +65,17 @@ impl WithSimd for Nearest<'_> {
     /// Index of the first of the nearest rim points.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> u32 {
-        let Self { at, point: [x, y, u, v], rim: [xs, ys, us, vs], squared, least, of_rim } = self;
+        let Self { at, point: [x, y, u, v], rim: [xs, ys, us, vs], squared, least, by_rim } = self;
         let count = squared.len();
         let (xs, ys, us, vs) = (&xs[..count], &ys[..count], &us[..count], &vs[..count]);
-        let (least, of_rim) = (&mut least[..count], &mut of_rim[..count]);
+        let (least, by_rim) = (&mut least[..count], &mut by_rim[..count]);
         for i in 0..count {
             let (dx, dy, du, dv) = (xs[i] - x, ys[i] - y, us[i] - u, vs[i] - v);
             let distance = dx * dx + dy * dy + du * du + dv * dv;
             squared[i] = distance;
             let is_less = distance < least[i];
             least[i] = if is_less { distance } else { least[i] };
-            of_rim[i] = if is_less { at } else { of_rim[i] };
+            by_rim[i] = if is_less { at } else { by_rim[i] };
         }
         let (chunks, rest) = squared.as_chunks::<LANES>();
         let mut lanes = [f32::INFINITY; LANES];

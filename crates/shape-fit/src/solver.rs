@@ -23,7 +23,7 @@ pub struct State {
 
 /// One step from coarse to fine.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stage {
+pub struct Pass {
     /// resolution: index of the observation's level
     pub level: usize,
     pub weighting: Weighting,
@@ -54,22 +54,22 @@ struct System {
 }
 
 impl Problem<'_> {
-    /// Goes through the stages; the energy is that of the last.
-    pub fn solve(&self, mut state: State, stages: &[Stage]) -> (State, f64) {
+    /// Goes through the passes; the energy is that of the last.
+    pub fn solve(&self, mut state: State, passes: &[Pass]) -> (State, f64) {
         let mut energy = f64::INFINITY;
-        for stage in stages {
-            (state, energy) = self.descend(state, stage);
+        for pass in passes {
+            (state, energy) = self.descend(state, pass);
         }
         (state, energy)
     }
 
-    fn descend(&self, mut state: State, stage: &Stage) -> (State, f64) {
-        let mut system = self.linearise(&state, stage);
+    fn descend(&self, mut state: State, pass: &Pass) -> (State, f64) {
+        let mut system = self.linearise(&state, pass);
         let mut damping = 1e-3;
         let (mut is_last, mut refused) = (false, 0);
-        for _ in 1..stage.evaluations {
+        for _ in 1..pass.evaluations {
             let Some(next) = self.step(&state, &system, damping) else { break };
-            let next_system = self.linearise(&next, stage);
+            let next_system = self.linearise(&next, pass);
             if next_system.energy < system.energy {
                 let gain = (system.energy - next_system.energy) / system.energy;
                 (state, system) = (next, next_system);
@@ -104,16 +104,16 @@ impl Problem<'_> {
         let dofs = self.model.rig().num_dofs();
         let mut next = state.clone();
         for (frame, pose) in next.poses.iter_mut().enumerate() {
-            let of_frame = step.rows(frame * dofs, dofs);
-            pose.iter_mut().zip(of_frame.iter()).for_each(|(x, step)| *x -= step);
+            let frame_step = step.rows(frame * dofs, dofs);
+            pose.iter_mut().zip(frame_step.iter()).for_each(|(x, step)| *x -= step);
         }
-        let of_shape = step.rows(state.poses.len() * dofs, state.alpha.len());
-        next.alpha.iter_mut().zip(of_shape.iter()).for_each(|(x, step)| *x -= step);
+        let shape_step = step.rows(state.poses.len() * dofs, state.alpha.len());
+        next.alpha.iter_mut().zip(shape_step.iter()).for_each(|(x, step)| *x -= step);
         Some(next)
     }
 
     /// Half the Hessian (Gauss–Newton), half the gradient, and the energy.
-    fn linearise(&self, state: &State, stage: &Stage) -> System {
+    fn linearise(&self, state: &State, pass: &Pass) -> System {
         let (dofs, components) = (self.model.rig().num_dofs(), state.alpha.len());
         let frames = state.poses.len();
         let (width, columns) = (dofs + components, dofs + components + 1);
@@ -123,7 +123,7 @@ impl Problem<'_> {
             gradient: DVector::zeros(shape_at + components),
             energy: 0.0,
         };
-        for (frame, found) in self.evaluate(state, stage).into_iter().enumerate() {
+        for (frame, found) in self.evaluate(state, pass).into_iter().enumerate() {
             let at = |i: usize| if i < dofs { frame * dofs + i } else { shape_at + i - dofs };
             // views are summed in their order, whatever thread they came from
             for Quadratic { product, energy } in found {
@@ -146,7 +146,7 @@ impl Problem<'_> {
             matrix[(shape_at + i, shape_at + i)] += weight;
             gradient[shape_at + i] += slope;
         });
-        for i in stage.components.min(components)..components {
+        for i in pass.components.min(components)..components {
             let i = shape_at + i;
             matrix.row_mut(i).fill(0.0);
             matrix.column_mut(i).fill(0.0);
@@ -157,7 +157,7 @@ impl Problem<'_> {
     }
 
     /// Of every view of every frame.
-    fn evaluate(&self, state: &State, stage: &Stage) -> Vec<Vec<Quadratic>> {
+    fn evaluate(&self, state: &State, pass: &Pass) -> Vec<Vec<Quadratic>> {
         let shape = self.model.shape(&state.alpha);
         self.frames
             .par_iter()
@@ -171,12 +171,12 @@ impl Problem<'_> {
                     model: self.model,
                     topology: self.topology,
                     body: &body,
-                    weighting: stage.weighting,
+                    weighting: pass.weighting,
                     components: self.model.num_components(),
                     options: &self.options,
                 };
                 let evaluate = |scratch: &mut Scratch, view: &&Observation| {
-                    term.evaluate(&view.levels[stage.level], scratch)
+                    term.evaluate(&view.levels[pass.level], scratch)
                 };
                 views.par_iter().map_init(Scratch::default, evaluate).collect()
             })

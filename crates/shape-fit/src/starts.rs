@@ -26,12 +26,12 @@ const SIZES: [f64; 5] = [0.0, -2.0, -1.0, 1.0, 2.0];
 
 /// Shapes to try where the shape is not known: coefficients, standard deviations, shape `[shapes][components]`.
 pub fn sizes(model: &BodyModel) -> Vec<Vec<f64>> {
-    let of_size = |&size: &f64| {
+    let scaled = |&size: &f64| {
         let mut alpha = vec![0.0; model.num_components()];
         alpha.iter_mut().take(1).for_each(|first| *first = size);
         alpha
     };
-    SIZES.iter().map(of_size).collect()
+    SIZES.iter().map(scaled).collect()
 }
 
 /// What starts are searched in.

@@ -73,7 +73,7 @@ impl<'a> Evidence<'a> {
         let mut best = unexplained;
         for n in 0..self.shapes.num_spans() {
             self.place(n, scales);
-            let fit = Fit::of(&self.found, observed);
+            let fit = Fit::new(&self.found, observed);
             self.exponents[n] = -0.5 * precision * fit.mean_square;
             best = best.max(self.exponents[n]);
         }
@@ -87,7 +87,7 @@ impl<'a> Evidence<'a> {
             let weight = exponent.exp();
             total += weight;
             self.place(n, scales);
-            let fit = Fit::of(&self.found, observed);
+            let fit = Fit::new(&self.found, observed);
             gradient += self.gradient(n, &fit, observed, scales) * (-0.5 * precision * weight);
         }
         Value { log: best + total.ln(), gradient: gradient / total }
@@ -123,7 +123,7 @@ struct Fit {
 }
 
 impl Fit {
-    fn of(found: &[Vector3<f64>], observed: &Observed) -> Self {
+    fn new(found: &[Vector3<f64>], observed: &Observed) -> Self {
         let mut count = 0.0;
         let (mut mean_a, mut mean_b) = ([0.0; 2], [0.0; 2]);
         let (mut squares, mut dot, mut cross) = (0.0, 0.0, 0.0);
@@ -175,7 +175,7 @@ mod tests {
         let motion = Model::bundled().draw(Action::Walk, 1, &DrawOptions { frames: 90, subject: 1 }).unwrap();
         let clip = Clip { name: "a".into(), subject: "1".into(), action: "walk".into(), motion };
         let database = MotionDatabase::build(&[clip]).unwrap();
-        let Population { mean, limbs, covariance, .. } = Population::of(&database).unwrap();
+        let Population { mean, limbs, covariance, .. } = Population::from_database(&database).unwrap();
         let points = control_points(&mean, &["left_wrist", "right_ankle", "head"]).unwrap();
         let shapes = Shapes::new(&database, &mean, &limbs, &points);
         let seen = |n: usize| {

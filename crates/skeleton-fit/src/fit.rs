@@ -83,7 +83,7 @@ pub fn fit_skeleton(
     if trajectories.num_points() != points.len() {
         return Err(Error::Trajectories { found: trajectories.num_points(), expected: points.len() });
     }
-    let population = Population::of(database)?;
+    let population = Population::from_database(database)?;
     let points = on_mean(database.skeleton(), &population, points);
     let observed = observed(trajectories);
     let shapes = Shapes::new(database, &population.mean, &population.limbs, &points);
@@ -97,7 +97,7 @@ pub fn fit_skeleton(
     let scales = [scales.x, scales.y, scales.z];
     let skeleton = population.limbs.scaled(&population.mean, scales)?;
     let points = points.into_iter().map(|p| {
-        let scale = scales[population.limbs.of_joint(p.joint) as usize];
+        let scale = scales[population.limbs.limb(p.joint) as usize];
         ControlPoint { offset: p.offset * scale, ..p }
     });
     let mut limb_scales = [LimbScale { scale: 1.0, sigma: 0.0 }; LIMBS.len()];
@@ -122,7 +122,7 @@ fn on_mean(template: &Skeleton, population: &Population, points: &[ControlPoint]
         if p.offset == tip {
             return ControlPoint { offset: population.mean.joints()[p.joint].tip, ..p.clone() };
         }
-        let limb = population.limbs.of_joint(p.joint) as usize;
+        let limb = population.limbs.limb(p.joint) as usize;
         let scale = if from[limb] > 0.0 { to[limb] / from[limb] } else { 1.0 };
         ControlPoint { offset: p.offset * scale, ..p.clone() }
     };

@@ -21,40 +21,40 @@ pub const LIMBS: [Limb; 3] = [Limb::Arms, Limb::Legs, Limb::Trunk];
 /// legs hang from the root and reach far below it, arms branch off the trunk where the neck does not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limbs {
-    of_joint: Vec<Limb>,
+    by_joint: Vec<Limb>,
 }
 
 impl Limbs {
     /// The limbs of `skeleton`. What cannot be told apart is trunk.
-    pub fn of(skeleton: &Skeleton) -> Self {
+    pub fn from_skeleton(skeleton: &Skeleton) -> Self {
         let tree = Tree::new(skeleton);
-        let mut of_joint = vec![Limb::Trunk; skeleton.num_joints()];
-        let Some(pelvis) = tree.first_branch(0) else { return Self { of_joint } };
+        let mut by_joint = vec![Limb::Trunk; skeleton.num_joints()];
+        let Some(pelvis) = tree.first_branch(0) else { return Self { by_joint } };
         let height = tree.state.positions[pelvis].y;
         let drop = |j: usize| height - tree.lowest(j);
         let deepest = tree.children(pelvis).map(drop).fold(0.0, f64::max);
         for child in tree.children(pelvis) {
             if drop(child) > 0.5 * deepest && deepest > 0.0 {
-                tree.mark(child, Limb::Legs, &mut of_joint);
+                tree.mark(child, Limb::Legs, &mut by_joint);
                 continue;
             }
             let Some(chest) = tree.first_branch(child) else { continue };
             let head = tree.children(chest).max_by(|a, b| tree.highest(*a).total_cmp(&tree.highest(*b)));
             for arm in tree.children(chest).filter(|j| Some(*j) != head) {
-                tree.mark(arm, Limb::Arms, &mut of_joint);
+                tree.mark(arm, Limb::Arms, &mut by_joint);
             }
         }
-        Self { of_joint }
+        Self { by_joint }
     }
 
     /// The limb to which the bone of a joint belongs: what lies between the joint and its tip or its children.
-    pub fn of_joint(&self, joint: usize) -> Limb {
-        self.of_joint[joint]
+    pub fn limb(&self, joint: usize) -> Limb {
+        self.by_joint[joint]
     }
 
     /// The limb that the offset of a joint from its parent belongs to; `None` for the root.
-    pub fn of_offset(&self, joint: &Joint) -> Option<Limb> {
-        joint.parent.map(|parent| self.of_joint[parent])
+    pub fn offset_limb(&self, joint: &Joint) -> Option<Limb> {
+        joint.parent.map(|parent| self.by_joint[parent])
     }
 
     /// Sum of the bone lengths of every limb, metres; offsets between joints, and tips of joints without children.
@@ -64,11 +64,11 @@ impl Limbs {
         for joint in skeleton.joints() {
             if let Some(parent) = joint.parent {
                 is_parent[parent] = true;
-                lengths[self.of_joint[parent] as usize] += joint.offset.norm();
+                lengths[self.by_joint[parent] as usize] += joint.offset.norm();
             }
         }
         for (j, joint) in skeleton.joints().iter().enumerate().filter(|(j, _)| !is_parent[*j]) {
-            lengths[self.of_joint[j] as usize] += joint.tip.norm();
+            lengths[self.by_joint[j] as usize] += joint.tip.norm();
         }
         lengths
     }
@@ -80,10 +80,10 @@ impl Limbs {
     pub fn scaled(&self, skeleton: &Skeleton, scales: [f64; 3]) -> Result<Skeleton> {
         let joints = skeleton.joints().iter().enumerate().map(|(j, joint)| {
             let mut joint = joint.clone();
-            if let Some(limb) = self.of_offset(&joint) {
+            if let Some(limb) = self.offset_limb(&joint) {
                 joint.offset *= scales[limb as usize];
             }
-            joint.tip *= scales[self.of_joint[j] as usize];
+            joint.tip *= scales[self.by_joint[j] as usize];
             joint
         });
         Ok(Skeleton::new(skeleton.name(), joints.collect())?)
@@ -148,9 +148,9 @@ impl<'a> Tree<'a> {
         self.heights(joint).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    fn mark(&self, joint: usize, limb: Limb, of_joint: &mut [Limb]) {
+    fn mark(&self, joint: usize, limb: Limb, by_joint: &mut [Limb]) {
         for j in self.below(joint) {
-            of_joint[j] = limb;
+            by_joint[j] = limb;
         }
     }
 }
@@ -168,8 +168,8 @@ mod tests {
     #[test]
     fn limbs_are_told_apart_by_the_shape_of_the_tree() {
         let skeleton = drawn();
-        let limbs = Limbs::of(&skeleton);
-        let limb = |name| limbs.of_joint(skeleton.joint_index(name).unwrap());
+        let limbs = Limbs::from_skeleton(&skeleton);
+        let limb = |name| limbs.limb(skeleton.joint_index(name).unwrap());
         for leg in ["lhipjoint", "lfemur", "rtibia", "rtoes"] {
             assert_eq!(limb(leg), Limb::Legs, "{leg}");
         }
@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn a_limb_is_scaled_alone() {
         let skeleton = drawn();
-        let limbs = Limbs::of(&skeleton);
+        let limbs = Limbs::from_skeleton(&skeleton);
         let before = limbs.lengths(&skeleton);
         let after = limbs.lengths(&limbs.scaled(&skeleton, [1.1, 0.9, 1.0]).unwrap());
         for ((after, before), scale) in after.iter().zip(before).zip([1.1, 0.9, 1.0]) {
@@ -197,8 +197,8 @@ mod tests {
         let root = Joint::root("root", vec![]);
         let tail = Joint::child("tail", 0, nalgebra::Vector3::y(), vec![]);
         let skeleton = Skeleton::new("worm", vec![root, tail]).unwrap();
-        let limbs = Limbs::of(&skeleton);
-        assert_eq!((limbs.of_joint(0), limbs.of_joint(1)), (Limb::Trunk, Limb::Trunk));
+        let limbs = Limbs::from_skeleton(&skeleton);
+        assert_eq!((limbs.limb(0), limbs.limb(1)), (Limb::Trunk, Limb::Trunk));
         assert_eq!(limbs.lengths(&skeleton), [0.0, 0.0, 1.0]);
     }
 }

@@ -29,7 +29,7 @@ impl Population {
     ///
     /// # Errors
     /// If the mean is not a skeleton.
-    pub fn of(database: &MotionDatabase) -> Result<Self> {
+    pub fn from_database(database: &MotionDatabase) -> Result<Self> {
         let mut distinct: Vec<&[f64]> = Vec::new();
         for clip in database.clips() {
             let is_same =
@@ -45,7 +45,7 @@ impl Population {
             mean.iter_mut().zip(*proportions).for_each(|(m, p)| *m += p / count);
         }
         let mean = with_proportions(template, &mean)?;
-        let limbs = Limbs::of(&mean);
+        let limbs = Limbs::from_skeleton(&mean);
         let middle = limbs.lengths(&mean);
         let mut scatter = Matrix3::zeros();
         for proportions in &distinct {

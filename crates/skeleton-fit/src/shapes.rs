@@ -130,13 +130,13 @@ impl<'a> Chain<'a> {
             let Some(parent) = joint.parent else { continue };
             self.to_joint[j] = self.to_joint[parent];
             let way = self.state.positions[j] - self.state.positions[parent];
-            self.to_joint[j][self.limbs.of_joint(parent) as usize] += way;
+            self.to_joint[j][self.limbs.limb(parent) as usize] += way;
         }
     }
 
     fn parts(&self, point: &ControlPoint) -> [Vector3<f64>; 3] {
         let mut parts = self.to_joint[point.joint];
-        let limb = self.limbs.of_joint(point.joint);
+        let limb = self.limbs.limb(point.joint);
         parts[limb as usize] += self.state.rotations[point.joint] * point.offset;
         parts
     }
@@ -155,7 +155,7 @@ mod tests {
         let motion = Model::bundled().draw(Action::Walk, 1, &DrawOptions { frames: 60, subject: 1 }).unwrap();
         let clip = Clip { name: "a".into(), subject: "1".into(), action: "walk".into(), motion };
         let database = MotionDatabase::build(&[clip]).unwrap();
-        let population = Population::of(&database).unwrap();
+        let population = Population::from_database(&database).unwrap();
         let limbs = &population.limbs;
         let scales = [1.2, 0.9, 1.05];
         let scaled = limbs.scaled(&population.mean, scales).unwrap();

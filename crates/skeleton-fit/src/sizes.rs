@@ -17,8 +17,8 @@ pub struct Sizes {
 
 impl Sizes {
     /// Of a skeleton. A limb that it does not have is 0 long.
-    pub fn of(skeleton: &Skeleton) -> Self {
-        let limbs = Limbs::of(skeleton);
+    pub fn from_skeleton(skeleton: &Skeleton) -> Self {
+        let limbs = Limbs::from_skeleton(skeleton);
         let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
         let mut state = kinematics.state();
         kinematics.update(&vec![0.0; skeleton.num_dofs()], &mut state);
@@ -26,8 +26,8 @@ impl Sizes {
         let mut longest = [0.0f64; LIMBS.len()];
         let mut way = vec![0.0; skeleton.num_joints()];
         for (j, joint) in skeleton.joints().iter().enumerate() {
-            let limb = limbs.of_joint(j);
-            if let Some(parent) = joint.parent.filter(|p| limbs.of_joint(*p) == limb) {
+            let limb = limbs.limb(j);
+            if let Some(parent) = joint.parent.filter(|p| limbs.limb(*p) == limb) {
                 way[j] = way[parent] + joint.offset.norm();
             }
             let tip = state.point(j, &joint.tip);

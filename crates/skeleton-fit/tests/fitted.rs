@@ -47,10 +47,10 @@ fn fit(database: &MotionDatabase, trajectories: &PointTrajectories) -> FittedSke
 fn a_performer_a_tenth_larger_or_smaller_is_found_to_be_so() {
     let database = database();
     let motion = walk(9, 9, 240);
-    let truth = Sizes::of(motion.skeleton());
+    let truth = Sizes::from_skeleton(motion.skeleton());
     for size in [0.9, 1.1] {
         let fitted = fit(&database, &measured(&motion, &SIX, size));
-        let found = Sizes::of(&fitted.skeleton);
+        let found = Sizes::from_skeleton(&fitted.skeleton);
         println!("{size}: {found:?} of {truth:?} {:?}", fitted.scales);
         for (found, truth) in [(found.height_m, truth.height_m), (found.leg_m, truth.leg_m)] {
             let error = found / (truth * size) - 1.0;
@@ -82,7 +82,7 @@ fn the_same_session_gives_the_same_bits_and_points_stay_on_their_limbs() {
     assert!((a.points[5].offset - a.skeleton.joints()[head].tip).norm() < 1e-9);
     // Only lengths differ from the database's skeletons.
     assert_eq!(database.structure_difference(&a.skeleton), None);
-    assert!(Limbs::of(&a.skeleton).lengths(&a.skeleton).iter().all(|l| *l > 0.0));
+    assert!(Limbs::from_skeleton(&a.skeleton).lengths(&a.skeleton).iter().all(|l| *l > 0.0));
 }
 
 #[test]

@@ -56,7 +56,7 @@ impl ExampleBuffer {
             let target = index.target(neighbour.row);
             database.copy_pose(target - 1, &mut self.before);
             database.copy_pose(target, &mut self.after);
-            let frame = HeadingFrame::of(&self.before);
+            let frame = HeadingFrame::from_coordinates(&self.before);
             let out = &mut self.targets[k * self.dofs..(k + 1) * self.dofs];
             frame.relative(&self.after, out);
             index.scale().scale(out);

@@ -15,12 +15,12 @@ mod bytes;
 mod chunks;
 mod error;
 mod examples;
+mod frame_part;
 mod live;
 mod methods;
 mod parameters;
 mod reconstruct;
 mod session;
-mod stage;
 mod tracker;
 mod training;
 mod uncertainty;
@@ -28,12 +28,12 @@ mod zero_pose;
 
 pub use chunks::{Chunk, Merged, merge, plan_chunks};
 pub use error::Error;
+pub use frame_part::FramePart;
 pub use kinematics::{ControlPoint, control_points};
 pub use live::{Live, LivePose, MAX_LIVE_STATE_BYTES};
 pub use parameters::{Covariance, Method, Parameters, Search};
 pub use reconstruct::{FrameQuality, Reconstruction, Reconstructor, control_table};
 pub use session::Session;
-pub use stage::Stage;
 pub use training::train_gplvm;
 
 /// Result of the fallible functions of this crate.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::bytes::{Reader, Writer};
 use crate::tracker::{Observed, Track, Tracker};
 use crate::uncertainty::Uncertainty;
-use crate::{Error, Parameters, Result, Session, Stage};
+use crate::{Error, FramePart, Parameters, Result, Session};
 
 const MAGIC: &[u8; 8] = b"MAREYRE2";
 /// Numbers a frame's quality is written as.
@@ -132,7 +132,7 @@ pub struct Reconstructor<'a> {
     /// frames around a frame that join its search
     pub(crate) around: &'static [i32],
     pub(crate) model: Option<&'a Gplvm>,
-    pub(crate) watcher: Option<&'a (dyn Fn(Stage) + Sync)>,
+    pub(crate) watcher: Option<&'a (dyn Fn(FramePart) + Sync)>,
     /// windows and poses that may not be used, in rising order
     pub(crate) exclude_rows: Vec<Range<usize>>,
     pub(crate) exclude_poses: Vec<Range<usize>>,
@@ -214,8 +214,8 @@ impl<'a> Reconstructor<'a> {
         Ok(self)
     }
 
-    /// With somebody told whenever a stage of a frame begins, so that its time can be taken: this crate has no clock.
-    pub fn watched(mut self, watcher: &'a (dyn Fn(Stage) + Sync)) -> Self {
+    /// With somebody told whenever a part of a frame begins, so that its time can be taken: this crate has no clock.
+    pub fn watched(mut self, watcher: &'a (dyn Fn(FramePart) + Sync)) -> Self {
         self.watcher = Some(watcher);
         self
     }
@@ -313,7 +313,7 @@ impl<'a> Reconstructor<'a> {
         let mut found = Vec::new();
         for frame in (frames.start..begun.frame).rev() {
             if let Some(start) = begun.pose {
-                let clip = &self.database.clips()[self.database.clip_of(start.pose)];
+                let clip = &self.database.clips()[self.database.clip_at(start.pose)];
                 // The track of a start ends in the pose before it.
                 let pose = (start.pose + 1 + frame).saturating_sub(begun.frame);
                 tracker.place(
@@ -349,7 +349,7 @@ impl<'a> Reconstructor<'a> {
         frame: usize,
         current: Option<Track>,
     ) -> Result<Begun> {
-        tracker.begin(Stage::Start);
+        tracker.begin(FramePart::Start);
         let trajectories = &self.session.trajectories;
         // Without two measured points there is nothing to fit: look at the first frame that has them.
         let has_two = |f: &usize| trajectories.frame(*f).iter().filter(|p| p.x.is_finite()).count() >= 2;
@@ -372,8 +372,8 @@ impl<'a> Reconstructor<'a> {
             &self.exclude_poses,
             self.parameters.start_candidates,
         );
-        let of_database = starts.iter().map(|s| (tracker.track_from(s), Some(*s)));
-        let mut probes: Vec<Probe> = of_database
+        let from_database = starts.iter().map(|s| (tracker.track_from(s), Some(*s)));
+        let mut probes: Vec<Probe> = from_database
             .chain(current.map(|track| (track, None)))
             .map(|(start, pose)| Probe { now: start.clone(), start, pose, surprise: 0.0 })
             .collect();

@@ -15,7 +15,7 @@ use crate::examples::ExampleBuffer;
 use crate::methods::predictor;
 use crate::uncertainty::Uncertainty;
 use crate::zero_pose::Information;
-use crate::{Covariance, Parameters, Reconstructor, Result, Search, Stage};
+use crate::{Covariance, FramePart, Parameters, Reconstructor, Result, Search};
 
 /// Standard deviations of samples are taken into this range, metres: beyond it the solver's arithmetic ends.
 const MIN_SIGMA_M: f64 = 1e-5;
@@ -123,7 +123,7 @@ pub struct Tracker<'a> {
     measured: Vec<Option<Measurement>>,
     local: Vec<f64>,
     found: Vec<f64>,
-    watcher: Option<&'a (dyn Fn(Stage) + Sync)>,
+    watcher: Option<&'a (dyn Fn(FramePart) + Sync)>,
 }
 
 impl<'a> Tracker<'a> {
@@ -202,20 +202,20 @@ impl<'a> Tracker<'a> {
 
     /// Takes `track` one frame further with what was measured in that frame.
     pub fn step(&mut self, track: &mut Track, observed: Observed<'_>) -> Step {
-        self.begin(Stage::Query);
-        let frame = HeadingFrame::of(track.newest());
+        self.begin(FramePart::Query);
+        let frame = HeadingFrame::from_coordinates(track.newest());
         self.measure(&frame, observed.now);
         if let Some((trajectories, now)) = observed.session {
             self.measure_around(&frame, trajectories, now);
         }
         self.find_neighbours(track);
-        self.begin(Stage::Prior);
+        self.begin(FramePart::Prior);
         self.predict();
         let mut solution = self.solve();
         while self.relinearise(&solution) {
             solution = self.solve();
         }
-        self.begin(Stage::Rest);
+        self.begin(FramePart::Rest);
         // The oldest pose makes room for the new one.
         track.history.rotate_right(1);
         let newest = &mut track.history[0];
@@ -229,18 +229,18 @@ impl<'a> Tracker<'a> {
         Step { solution, measured, neighbour_distance: (nearest / self.query.len() as f64).sqrt() }
     }
 
-    /// Tells the watcher, if there is one, that a stage begins.
+    /// Tells the watcher, if there is one, that a part begins.
     #[inline]
-    pub fn begin(&self, stage: Stage) {
+    pub fn begin(&self, part: FramePart) {
         if let Some(watcher) = self.watcher {
-            watcher(stage);
+            watcher(part);
         }
     }
 
     /// The most probable pose between prediction and measurement.
     fn solve(&mut self) -> Solution {
         self.set_prior();
-        self.begin(Stage::Map);
+        self.begin(FramePart::Map);
         self.solver.solve(
             self.kinematics,
             &mut self.likelihood,
@@ -407,7 +407,7 @@ impl<'a> Tracker<'a> {
         let controls = Some((self.table, &self.controls[..], &self.control_weights[..]));
         let query =
             Query { features: &self.query_single, controls, exclude: self.exclude, hints: &track.matches };
-        self.begin(Stage::Search);
+        self.begin(FramePart::Search);
         let (k, scratch, found) = (self.parameters.neighbours, &mut self.search, &mut self.neighbours);
         match self.parameters.search {
             Search::Exact => self.index.nearest(&query, k, scratch, found),

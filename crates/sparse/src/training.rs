@@ -27,7 +27,7 @@ pub fn train_gplvm(
 /// Every pose with one before it, relative to the heading frame of that one, degrees and centimetres.
 fn training_set(database: &MotionDatabase, is_excluded: &dyn Fn(&ClipInfo) -> bool) -> TrainingSet {
     let dofs = database.num_dofs();
-    let scale = FeatureScale::of(database);
+    let scale = FeatureScale::from_database(database);
     let clips = || database.clips().iter().filter(|c| !is_excluded(c));
     let total: usize = clips().map(|c| c.num_poses.saturating_sub(1)).sum();
     let step = total.div_ceil(MOST_POSES).max(1);
@@ -41,7 +41,7 @@ fn training_set(database: &MotionDatabase, is_excluded: &dyn Fn(&ClipInfo) -> bo
     let targets = clips().flat_map(|c| c.first_pose + 1..c.first_pose + c.num_poses);
     for target in targets.step_by(step) {
         database.copy_pose(target - 1, &mut world);
-        let frame = HeadingFrame::of(&world);
+        let frame = HeadingFrame::from_coordinates(&world);
         frame.relative(&world, &mut before);
         database.copy_pose(target, &mut world);
         frame.relative(&world, &mut pose);

@@ -44,8 +44,9 @@ impl Store {
         let found: Vec<Key> = self.list(prefix).map_ok(|(key, _)| key).try_collect().await?;
         for key in found {
             let rest = key.as_str().strip_prefix(prefix.as_str()).and_then(|rest| rest.strip_prefix('/'));
-            let of = rest.and_then(|rest| rest.split('/').next()).and_then(|of| of.parse::<i64>().ok());
-            if of.is_some_and(|of| of < lease) {
+            let written =
+                rest.and_then(|rest| rest.split('/').next()).and_then(|name| name.parse::<i64>().ok());
+            if written.is_some_and(|written| written < lease) {
                 self.delete(&key).await?;
                 removed += 1;
             }

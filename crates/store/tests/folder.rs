@@ -128,7 +128,7 @@ async fn an_upload_with_the_wrong_checksum_leaves_the_old_object() {
 }
 
 #[tokio::test]
-async fn of_many_creators_exactly_one_succeeds() {
+async fn exactly_one_creator_among_many_succeeds() {
     let folder = tempfile::tempdir().unwrap();
     let store = open(folder.path());
     let key = key("runs/lock");

@@ -69,7 +69,8 @@ fn local_frame_of_8_views_with_texture(bencher: Bencher) {
     bencher.bench_local(|| {
         tracker.restart_at(0, &before).unwrap();
         let frame = ObservedFrame::new(1, &views).unwrap();
-        let with = |frame: ObservedFrame, (camera, of): (usize, &Vec<_>)| frame.with_matches(camera, of);
+        let with =
+            |frame: ObservedFrame, (camera, matches): (usize, &Vec<_>)| frame.with_matches(camera, matches);
         tracker.track(&matches.iter().enumerate().fold(frame, with), &false.into()).unwrap()
     });
 }

@@ -30,7 +30,7 @@ struct Counts {
 }
 
 impl Counts {
-    fn of(frame: &Tracked) -> Self {
+    fn from_tracked(frame: &Tracked) -> Self {
         Self { dofs: frame.pose.len(), joints: frame.joints.len(), cameras: frame.ious.len() }
     }
 
@@ -45,7 +45,7 @@ impl Chunk {
     /// # Errors
     /// [`Error::File`] if frames differ in their numbers of DOFs, joints or cameras.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
-        let counts = self.frames.first().map_or(Counts::default(), Counts::of);
+        let counts = self.frames.first().map_or(Counts::default(), Counts::from_tracked);
         let mut bytes = MAGIC.to_vec();
         bytes.reserve(HEAD + self.frames.len() * counts.frame_bytes());
         for count in [counts.dofs, counts.joints, counts.cameras, self.frames.len()] {
@@ -53,7 +53,7 @@ impl Chunk {
             bytes.extend(count.to_le_bytes());
         }
         for frame in &self.frames {
-            if Counts::of(frame) != counts {
+            if Counts::from_tracked(frame) != counts {
                 return Err(damaged(format!(
                     "frame {} has other cameras or joints than the first",
                     frame.frame

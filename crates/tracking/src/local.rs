@@ -157,13 +157,14 @@ impl Local {
             scale_m: step.texture_m,
         });
         let views = frame.views.par_iter().zip(points).zip(&mut self.scratches);
-        let evaluate = |((view, points), (scratch, of_texture)): ((&ObservedView, &Vec<_>), &mut (_, _))| {
-            let mut found = term.evaluate(&view.observation.levels[step.level], scratch);
-            if let Some(texture) = &texture {
-                texture.add(points, of_texture, &mut found);
-            }
-            found
-        };
+        let evaluate =
+            |((view, points), (scratch, texture_scratch)): ((&ObservedView, &Vec<_>), &mut (_, _))| {
+                let mut found = term.evaluate(&view.observation.levels[step.level], scratch);
+                if let Some(texture) = &texture {
+                    texture.add(points, texture_scratch, &mut found);
+                }
+                found
+            };
         let found: Vec<Quadratic> = views.map(evaluate).collect();
         let dofs = pose.len();
         let mut system =

@@ -75,11 +75,11 @@ impl Misalignment {
     /// Indices of the DOFs that move misaligned limbs: their own, and the twist of the limb above, which only shows in them; all
     /// DOFs if the torso is misaligned.
     pub fn dofs(&self, model: &BodyModel) -> Vec<usize> {
-        let of_joints = Limb::for_joints(model.rig());
+        let limbs = Limb::for_joints(model.rig());
         let is_misaligned = |limb: Limb| self.limbs[position(limb)].is_misaligned;
         let all = model.rig().dofs().iter().enumerate();
         let is_wanted = |(d, dof): &(usize, &body::Dof)| {
-            let limb = of_joints[dof.joint];
+            let limb = limbs[dof.joint];
             let is_below = |below: &Limb| below.parent() == Some(limb) && is_misaligned(*below);
             is_misaligned(limb)
                 || *d >= ROOT_DOFS && dof.name.ends_with("twist") && Limb::ALL.iter().any(is_below)

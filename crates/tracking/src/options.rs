@@ -58,8 +58,8 @@ pub struct ParticleOptions {
     pub part: Part,
     /// standard deviation of the first particles about the pose that failed, radians
     pub spread: f64,
-    /// seed of the session
-    pub session: u64,
+    /// seed of every random number: the same seed, the same result
+    pub seed: u64,
 }
 
 impl Default for ParticleOptions {
@@ -72,7 +72,7 @@ impl Default for ParticleOptions {
             annealing: Annealing::Interacting,
             part: Part::Misaligned,
             spread: 0.5,
-            session: 0,
+            seed: 0,
         }
     }
 }

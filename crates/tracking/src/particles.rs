@@ -2,7 +2,7 @@
 //!
 //! In iteration k every particle has the weight `exp(−β_k E)`, β grows, weights sum to 1. Interacting: a particle stays with the
 //! probability of its weight divided by the largest, others become copies of particles drawn by weight; all move by noise with
-//! the covariance of the particles, made smaller. Every random number belongs to (session, frame, iteration, particle).
+//! the covariance of the particles, made smaller. Every random number belongs to (seed, frame, iteration, particle).
 
 use body::{BodyModel, ROOT_DOFS, Shape};
 use nalgebra::{DMatrix, DVector};
@@ -86,7 +86,7 @@ impl Space<'_> {
         if particle == 0 {
             return;
         }
-        let mut chance = Chance::new(self.options.session, self.frame.index, 0, particle);
+        let mut chance = Chance::new(self.options.seed, self.frame.index, 0, particle);
         let share = if particle == 1 { 1.0 } else { chance.uniform() };
         let from = chance.uniform() * self.training_poses.len() as f64;
         let is_trained = self.options.with_prior && particle % FROM_TRAINING == 2;
@@ -222,7 +222,7 @@ impl Particles {
         let mut step = DVector::zeros(space.dofs.len());
         self.chosen.resize(self.poses.len(), 0.0);
         for (particle, pose) in self.chosen.chunks_exact_mut(dofs).enumerate() {
-            let mut chance = Chance::new(options.session, space.frame.index, iteration, particle);
+            let mut chance = Chance::new(options.seed, space.frame.index, iteration, particle);
             let stays = options.annealing == Annealing::Interacting
                 && chance.uniform() * largest < self.weights[particle];
             let from = if stays { particle } else { drawn(&self.weights, chance.uniform()) };

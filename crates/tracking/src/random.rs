@@ -3,18 +3,18 @@ use std::f64::consts::TAU;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// Random numbers of one particle in one iteration of one frame of a session: the same whatever thread asks.
+/// Random numbers of one particle in one iteration of one frame: the same whatever thread asks.
 pub struct Chance(ChaCha8Rng);
 
 impl Chance {
-    /// The stream of (session, frame, iteration, particle).
-    pub fn new(session: u64, frame: usize, iteration: usize, particle: usize) -> Self {
-        let mut seed = [0; 32];
-        let numbers = [session, frame as u64, iteration as u64, particle as u64];
-        for (bytes, number) in seed.chunks_exact_mut(8).zip(numbers) {
+    /// The stream of (seed, frame, iteration, particle).
+    pub fn new(seed: u64, frame: usize, iteration: usize, particle: usize) -> Self {
+        let mut key = [0; 32];
+        let numbers = [seed, frame as u64, iteration as u64, particle as u64];
+        for (bytes, number) in key.chunks_exact_mut(8).zip(numbers) {
             bytes.copy_from_slice(&number.to_le_bytes());
         }
-        Self(ChaCha8Rng::from_seed(seed))
+        Self(ChaCha8Rng::from_seed(key))
     }
 
     /// Uniform in [0, 1).
@@ -37,7 +37,7 @@ mod tests {
     #[test]
     fn streams_differ_in_each_of_their_four_numbers() {
         let first =
-            |session, frame, iteration, particle| Chance::new(session, frame, iteration, particle).uniform();
+            |seed, frame, iteration, particle| Chance::new(seed, frame, iteration, particle).uniform();
         let all =
             [first(1, 2, 3, 4), first(2, 2, 3, 4), first(1, 3, 3, 4), first(1, 2, 4, 4), first(1, 2, 3, 5)];
         for (i, a) in all.iter().enumerate() {

@@ -23,8 +23,8 @@ const BLOCK: usize = 64;
 pub struct TextureScratch {
     rows: Vec<f64>,
     block: Vec<f64>,
-    of_point: Vec<Vector3<f64>>,
-    of_corner: Vec<Vector3<f64>>,
+    by_point: Vec<Vector3<f64>>,
+    by_corner: Vec<Vector3<f64>>,
 }
 
 /// A body in a pose.
@@ -43,8 +43,8 @@ impl TextureTerm<'_> {
         let dofs = self.model.rig().num_dofs();
         let columns = dofs + 1;
         scratch.block.resize(columns * columns, 0.0);
-        scratch.of_point.resize(dofs, Vector3::zeros());
-        scratch.of_corner.resize(dofs, Vector3::zeros());
+        scratch.by_point.resize(dofs, Vector3::zeros());
+        scratch.by_corner.resize(dofs, Vector3::zeros());
         let scale2 = self.scale_m * self.scale_m;
         let least = 1.0 / (SIGMA_M * SIGMA_M + (COARSE * self.scale_m).powi(2));
         for points in points.chunks(BLOCK) {
@@ -60,7 +60,7 @@ impl TextureTerm<'_> {
                 let root = weight.sqrt() * robust;
                 self.differentiate(point, scratch);
                 for (axis, residual) in axes.iter().zip(residual) {
-                    scratch.rows.extend(scratch.of_point.iter().map(|moved| root * axis.dot(moved)));
+                    scratch.rows.extend(scratch.by_point.iter().map(|moved| root * axis.dot(moved)));
                     scratch.rows.push(root * residual);
                 }
             }
@@ -75,12 +75,12 @@ impl TextureTerm<'_> {
         corners.map(|(&vertex, weight)| self.posed.vertices[vertex as usize] * weight).sum()
     }
 
-    /// Derivative of that with respect to the pose, into `scratch.of_point`.
+    /// Derivative of that with respect to the pose, into `scratch.by_point`.
     fn differentiate(&self, point: &SurfacePoint, scratch: &mut TextureScratch) {
-        scratch.of_point.fill(Vector3::zeros());
+        scratch.by_point.fill(Vector3::zeros());
         for (&vertex, weight) in point.vertices.iter().zip(point.weights) {
-            self.posed.vertex_by_pose(self.model, self.shape, vertex as usize, &mut scratch.of_corner);
-            for (sum, moved) in scratch.of_point.iter_mut().zip(&scratch.of_corner) {
+            self.posed.vertex_by_pose(self.model, self.shape, vertex as usize, &mut scratch.by_corner);
+            for (sum, moved) in scratch.by_point.iter_mut().zip(&scratch.by_corner) {
                 *sum += moved * weight;
             }
         }
@@ -132,12 +132,12 @@ mod tests {
         let term = TextureTerm { model: &model, shape: &shape, posed: &posed, scale_m: 0.1 };
         let mut scratch = TextureScratch::default();
         let mut jacobian = Vec::new();
-        scratch.of_point.resize(pose.len(), Vector3::zeros());
-        scratch.of_corner.resize(pose.len(), Vector3::zeros());
+        scratch.by_point.resize(pose.len(), Vector3::zeros());
+        scratch.by_corner.resize(pose.len(), Vector3::zeros());
         for point in &points {
             term.differentiate(point, &mut scratch);
             for axis in axes_across(&point.direction) {
-                jacobian.extend(scratch.of_point.iter().map(|moved| axis.dot(moved)));
+                jacobian.extend(scratch.by_point.iter().map(|moved| axis.dot(moved)));
             }
         }
         check_jacobian(&pose, 2 * points.len(), &jacobian, 1e-6, |pose, residuals| {

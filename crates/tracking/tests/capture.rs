@@ -52,9 +52,9 @@ const PICTURES: usize = 4;
 fn matches(folder: &Path, camera: &Camera, frames: &[Vec<(Camera, Silhouette)>]) -> Vec<Vec<PointMatch>> {
     let options = features::Options { reach: 0.3, ..features::Options::default() };
     let mut before = Features::default();
-    let of_frame = |(frame, views): (usize, &Vec<(Camera, Silhouette)>)| {
+    let from_frame = |(frame, views): (usize, &Vec<(Camera, Silhouette)>)| {
         let silhouette =
-            views.iter().find(|(of, _)| of.name == camera.name).map(|(_, silhouette)| silhouette);
+            views.iter().find(|(own, _)| own.name == camera.name).map(|(_, silhouette)| silhouette);
         let name = format!("images/{}/{frame:04}.jpg", camera.name);
         let Some(silhouette) = silhouette.filter(|_| folder.join(&name).exists()) else { return Vec::new() };
         let bytes = testkit::shared::read(folder, &name);
@@ -69,7 +69,7 @@ fn matches(folder: &Path, camera: &Camera, frames: &[Vec<(Camera, Silhouette)>])
         before = now;
         pairs
     };
-    frames.iter().enumerate().map(of_frame).collect()
+    frames.iter().enumerate().map(from_frame).collect()
 }
 
 /// What is expected of a run.
@@ -100,8 +100,8 @@ fn judge(test: &str, case: &Case) {
     println!("{test}: {count} matches");
     let prepare = |(index, views): (usize, &Vec<_>)| -> Result<_, Error> {
         let frame = ObservedFrame::new(index, views)?;
-        let with = |frame: ObservedFrame, (camera, of): (usize, &Vec<Vec<_>>)| {
-            frame.with_matches(camera, &of[index])
+        let with = |frame: ObservedFrame, (camera, matches): (usize, &Vec<Vec<_>>)| {
+            frame.with_matches(camera, &matches[index])
         };
         Ok(matches.iter().enumerate().fold(frame, with))
     };

@@ -210,14 +210,14 @@ fn a_person_who_comes_late_and_leaves_is_followed_from_where_they_are_found() {
     assert_eq!(hold_unseen(&model, &shape, &mut chunk.frames), 4);
     for (frame, tracked) in chunk.frames.iter().enumerate() {
         assert_eq!(tracked.stage == Stage::Unseen, is_empty(frame), "frame {frame}");
-        let of = if frame < 2 {
+        let expected = if frame < 2 {
             2
         } else if is_empty(frame) {
             10
         } else {
             frame
         };
-        let worst = distances(&tracked.joints, &frames[of].1).fold(0.0, f64::max);
+        let worst = distances(&tracked.joints, &frames[expected].1).fold(0.0, f64::max);
         assert!(worst < 0.06, "frame {frame}: {worst} m");
     }
 }

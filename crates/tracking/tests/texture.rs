@@ -8,7 +8,7 @@ mod textured;
 use std::sync::atomic::AtomicBool;
 
 use body::{BodyModel, Posed, Shape};
-use features::FeatureTracker;
+use features::FrameMatcher;
 use model::{Camera, PointMatch};
 use moving::{Views, cameras, distances, mixed, pose, seen};
 use nalgebra::{Vector2, Vector3};
@@ -34,18 +34,18 @@ fn film(model: &BodyModel, shape: &Shape, motion: &[Vec<f64>], cameras: &[Camera
     let topology = Topology::new(model.faces(), model.num_vertices());
     let (views, joints): (Vec<_>, Vec<_>) =
         motion.iter().map(|pose| seen(model, shape, pose, cameras)).unzip();
-    let of_camera = |index: usize| {
-        let mut tracker = FeatureTracker::new(features::Options::default());
-        let mut of_frame = |(frame, pose): (usize, &Vec<f64>)| {
+    let from_camera = |index: usize| {
+        let mut matcher = FrameMatcher::new(features::Options::default());
+        let mut from_frame = |(frame, pose): (usize, &Vec<f64>)| {
             let mut posed = Posed::default();
             shape.pose(model, pose, &mut posed);
             let image = textured::picture(model, shape, &posed, &topology, &cameras[index]);
             let views: &Views = &views[frame];
-            tracker.push(&image, &views[index].1)
+            matcher.push(&image, &views[index].1)
         };
-        motion.iter().enumerate().map(&mut of_frame).collect()
+        motion.iter().enumerate().map(&mut from_frame).collect()
     };
-    let matches = (0..cameras.len()).into_par_iter().map(of_camera).collect();
+    let matches = (0..cameras.len()).into_par_iter().map(from_camera).collect();
     Film { views, joints, matches }
 }
 

@@ -83,7 +83,7 @@ impl Chamfer {
         let size = |silhouette: &Silhouette| (silhouette.width(), silhouette.height());
         assert_eq!(size(drawn), size(&observed.silhouette), "silhouettes of the same size");
         let far = (drawn.width() + drawn.height()) as f64;
-        let (Some(of_drawn), Some(of_observed)) = (bounds, observed.bounds) else {
+        let (Some(drawn_bounds), Some(observed_bounds)) = (bounds, observed.bounds) else {
             let (drawn, observed) = (drawn.area(), observed.area);
             let mean = |area: usize| if area == 0 { 0.0 } else { far };
             let iou = if drawn + observed == 0 { 1.0 } else { 0.0 };
@@ -94,14 +94,14 @@ impl Chamfer {
                 iou,
             };
         };
-        let (drawn_area, drawn_only, drawn_sum) = sum_drawn(drawn, of_drawn, observed);
+        let (drawn_area, drawn_only, drawn_sum) = sum_drawn(drawn, drawn_bounds, observed);
         let both = drawn_area - drawn_only;
         let observed_only = observed.area - both;
         let observed_sum = if observed_only == 0 {
             0.0
         } else {
             let [left, top, right, bottom] = [0, 1, 2, 3].map(|side| {
-                let (a, b) = (of_drawn[side], of_observed[side]);
+                let (a, b) = (drawn_bounds[side], observed_bounds[side]);
                 if side < 2 { a.min(b) } else { a.max(b) }
             });
             // whole words, so that a row of the box is words of the silhouette
@@ -275,8 +275,8 @@ mod tests {
         silhouette
     }
 
-    /// Mean distance of the pixels of `of` from `from`, by all pairs.
-    fn mean(of: &Silhouette, from: &Silhouette) -> f64 {
+    /// Mean distance of the pixels of `silhouette` from `from`, by all pairs.
+    fn mean(silhouette: &Silhouette, from: &Silhouette) -> f64 {
         let pixels = |silhouette: &Silhouette| -> Vec<(isize, isize)> {
             let all = (0..150).flat_map(|y| (0..200).map(move |x| (x, y)));
             all.filter(|&(x, y)| silhouette.contains(x, y)).collect()
@@ -286,7 +286,7 @@ mod tests {
             let squares = sites.iter().map(|(a, b)| (a - x).pow(2) + (b - y).pow(2));
             squares.min().map_or(0.0, |squared| ((squared as f64).sqrt() - 0.5).max(0.0))
         };
-        let pixels = pixels(of);
+        let pixels = pixels(silhouette);
         pixels.iter().map(distance).sum::<f64>() / pixels.len() as f64
     }
 

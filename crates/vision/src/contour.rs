@@ -220,8 +220,8 @@ mod tests {
         }
         let found = contours(&silhouette, &ContourOptions::default());
         assert_eq!(found.iter().map(|contour| contour.is_hole).collect::<Vec<_>>(), [false, true]);
-        let of_border = found[0].points.iter().filter(|point| point.is_border).count();
-        assert!((28..=32).contains(&of_border), "{of_border} of 60 pixels at steps of two");
+        let on_border = found[0].points.iter().filter(|point| point.is_border).count();
+        assert!((28..=32).contains(&on_border), "{on_border} of 60 pixels at steps of two");
         // away from the person: into the hole
         assert!(found[1].points.iter().all(|p| p.normal.dot(&(Vector2::new(39.5, 49.5) - p.pixel)) > 0.0));
     }

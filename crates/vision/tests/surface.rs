@@ -86,9 +86,9 @@ fn samples_are_spread_by_area_and_repeat() {
     let (mut area, mut sum) = (0.0, Vector3::zeros());
     for face in &mesh.faces {
         let [a, b, c] = mesh.corners(face);
-        let of_face = (b - a).cross(&(c - a)).norm() / 2.0;
-        area += of_face;
-        sum += (a + b + c) / 3.0 * of_face;
+        let face_area = (b - a).cross(&(c - a)).norm() / 2.0;
+        area += face_area;
+        sum += (a + b + c) / 3.0 * face_area;
     }
     let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     assert!((mean - sum / area).norm() < 0.01, "{mean}, expected {}", sum / area);

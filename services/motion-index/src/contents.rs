@@ -88,7 +88,7 @@ impl Names {
 pub(crate) fn names(clips: &[PartClip], names: &mut Names) -> Vec<String> {
     let mut trial = (None, String::new());
     let name = |clip: &PartClip| {
-        let own = motion_db::trial_of(&clip.name);
+        let own = motion_db::trial_name(&clip.name);
         if trial.0 != Some(clip.file) {
             trial = (Some(clip.file), names.unique(own));
         }

@@ -177,6 +177,6 @@ fn coordinates(database: &MotionDatabase, values: &[f64]) -> Result<Vec<f64>, Er
 }
 
 fn at(database: &MotionDatabase, pose: usize, distance: f64) -> Match {
-    let clip = &database.clips()[database.clip_of(pose)];
+    let clip = &database.clips()[database.clip_at(pose)];
     Match { clip: clip.name.clone(), frame: pose - clip.first_pose, distance }
 }

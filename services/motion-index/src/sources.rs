@@ -7,7 +7,7 @@ use crate::{
 };
 use jobs::motion_database::{BuildMotionDatabase, PartReport};
 use library::{motion_database, motion_database::Shard};
-use motion_db::{MotionDatabase, trial_of};
+use motion_db::{MotionDatabase, trial_name};
 use queue::{Artefact, JobContext, JobError};
 use service::{Resources, compute};
 use std::{collections::BTreeSet, sync::Arc};
@@ -81,10 +81,10 @@ impl Sources {
         for shard in shards {
             let database = shard.open(store, max_bytes).await.map_err(failed)?.database;
             for (index, clip) in database.clips().iter().enumerate() {
-                if without.contains(clip.name.as_str()) || without.contains(trial_of(&clip.name)) {
+                if without.contains(clip.name.as_str()) || without.contains(trial_name(&clip.name)) {
                     continue;
                 }
-                if trial_of(&clip.name) == clip.name {
+                if trial_name(&clip.name) == clip.name {
                     self.names.unique(&clip.name);
                 }
                 let (name, subject, action) = (clip.name.clone(), clip.subject.clone(), clip.action.clone());
@@ -101,7 +101,7 @@ impl Sources {
         let Some(part) = part else { return };
         let names = names(&report.clips, &mut self.names);
         for (index, (clip, name)) in report.clips.into_iter().zip(names).enumerate() {
-            if name != clip.name && trial_of(&clip.name) == clip.name {
+            if name != clip.name && trial_name(&clip.name) == clip.name {
                 self.warnings.push(format!("another motion named {} is called {name}", clip.name));
             }
             let clip = Clip { name, subject: clip.subject, action: clip.action, num_poses: clip.num_poses };

@@ -4,7 +4,7 @@ mod fixture;
 
 use fixture::{Fixture, plan};
 use jobs::motion_database::{Augment, MotionDatabaseFile, PlanMotionDatabase, TrainGplvm};
-use motion_db::{MotionDatabase, trial_of};
+use motion_db::{MotionDatabase, trial_name};
 use queue::RunState;
 use regression::gplvm::TrainingOptions;
 use serde_json::{Value, json};
@@ -69,7 +69,7 @@ async fn a_version_holds_the_clips_of_its_base_bit_for_bit_and_the_new_ones() {
     let (old, new) = (fixture.open(&first).await, fixture.open(&second).await);
     // The file named 7_01 is another motion than the clip 7_01 that is kept.
     assert_eq!(names(&new), ["7_01", "7_03", "7_01_2", "7_04"]);
-    assert!(new.has_coordinates_of(&old));
+    assert!(new.has_same_coordinates_as(&old));
     let poses = |database: &MotionDatabase, clip: usize| {
         let clip = &database.clips()[clip];
         (0..clip.num_poses).flat_map(|i| database.pose(clip.first_pose + i).to_vec()).collect::<Vec<f32>>()
@@ -112,7 +112,7 @@ async fn recordings_are_mirrored_and_warped_and_what_is_made_of_a_trial_goes_wit
     let mut plan = added(&fixture, &first, &[]).await;
     plan.without = vec!["7_01".to_owned()];
     let second = fixture.open(&fixture.build(&plan).await).await;
-    assert!(second.clips().iter().all(|clip| trial_of(&clip.name) == "7_02"), "{:?}", names(&second));
+    assert!(second.clips().iter().all(|clip| trial_name(&clip.name) == "7_02"), "{:?}", names(&second));
     fixture.stop().await;
 }
 

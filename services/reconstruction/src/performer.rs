@@ -26,7 +26,7 @@ pub(crate) fn fit(
     let [arms, legs, trunk] = fitted.scales;
     let percent =
         |limb: LimbScale| format!("{:+.0} ± {:.0} %", 100.0 * (limb.scale - 1.0), 100.0 * limb.sigma);
-    let sizes = Sizes::of(&fitted.skeleton);
+    let sizes = Sizes::from_skeleton(&fitted.skeleton);
     warnings.push(format!(
         "no skeleton file: one was fitted, {:.2} m high in its rest pose (less than the stature); against the mean of the {} \
          performers of the database: arms {}, legs {}, trunk {}",

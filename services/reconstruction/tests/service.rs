@@ -222,7 +222,7 @@ async fn a_marker_file_is_read_through_the_mapping() {
     assert!(report["warnings"][0].as_str().unwrap().contains("no skeleton file"), "{}", report["warnings"]);
     assert!(report["fitted_skeleton"]["sizes"]["height_m"].as_f64().unwrap() > 0.5, "{report}");
     let asf = formats::asf::read(fixture.text(&results["skeleton.asf"]).await.as_bytes()).unwrap().value;
-    let height = skeleton_fit::Sizes::of(&asf.skeleton).height_m;
+    let height = skeleton_fit::Sizes::from_skeleton(&asf.skeleton).height_m;
     assert!((height - report["fitted_skeleton"]["sizes"]["height_m"].as_f64().unwrap()).abs() < 1e-3);
     assert!(!results.contains_key("evaluation.json"));
     service.stop().await;

@@ -18,7 +18,7 @@ pub(crate) fn run(parameters: &Parameters) -> Options {
         particles: parameters.particles,
         iterations: parameters.iterations,
         with_prior: parameters.prior,
-        session: parameters.seed,
+        seed: parameters.seed,
         ..ParticleOptions::default()
     };
     Options {

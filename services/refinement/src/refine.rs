@@ -82,7 +82,7 @@ fn particles(asked: &v1::RefineOptions) -> ParticleOptions {
             RefineAnnealing::Filter => Annealing::Filter,
         },
         part: if asked.whole_pose { Part::Whole } else { Part::Misaligned },
-        session: asked.seed,
+        seed: asked.seed,
         ..default
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, atomic::AtomicBool};
 
 use background::{CameraQuality, Segmenter};
-use features::FeatureTracker;
+use features::FrameMatcher;
 use formats::{archive::Entry, image_files};
 use model::{Image, Silhouette};
 use multi_view::{ClipWriter, MatchClipWriter, Parameters};
@@ -49,7 +49,7 @@ struct Packer<'a, S> {
     expected: Option<usize>,
     clip: Option<ClipWriter>,
     /// where points are looked for in the pictures
-    features: Option<FeatureTracker>,
+    features: Option<FrameMatcher>,
     matches: Option<MatchClipWriter>,
     sink: &'a mut S,
 }
@@ -213,7 +213,7 @@ pub(crate) fn from_frames(
     stream.skip(parameters.first_frame)?;
     let mut packer = Packer::new(parameters, announced.count, sink);
     if parameters.track && parameters.texture {
-        packer.features = Some(FeatureTracker::default());
+        packer.features = Some(FrameMatcher::default());
     }
     let mut frame = Image::black(0, 0);
     while !packer.is_full() && stream.next(&mut frame)? {

@@ -147,13 +147,13 @@ impl ShapeHandler {
         clips: &[CameraClips],
         end_frame: usize,
     ) -> Result<Found, FindError> {
-        let wanted = parameters.frames_of_shape(end_frame);
+        let wanted = parameters.shape_fit_frames(end_frame);
         let first = match self.find_in(model, parameters, clips, &wanted).await {
             Err(FindError::Nobody(error)) if parameters.track => error,
             found => return found,
         };
         let spread = Parameters { shape_frames: LATER_TRIES + 1, shape_step: None, ..parameters.clone() };
-        for frame in spread.frames_of_shape(end_frame).into_iter().filter(|frame| !wanted.contains(frame)) {
+        for frame in spread.shape_fit_frames(end_frame).into_iter().filter(|frame| !wanted.contains(frame)) {
             context.check()?;
             match self.find_in(model, parameters, clips, &[frame]).await {
                 Err(FindError::Nobody(_)) => {}

@@ -10,21 +10,21 @@ use std::{
 
 use anyhow::{Context, bail};
 use evaluation::{ControlSet, control_trajectories};
-use motion_db::{Clip, MotionDatabase, WindowIndex, trial_of};
+use motion_db::{Clip, MotionDatabase, WindowIndex, trial_name};
 use serde::Serialize;
-use sparse::{Parameters, Reconstructor, Session, Stage, control_points};
+use sparse::{FramePart, Parameters, Reconstructor, Session, control_points};
 
 use crate::motions;
 
 /// Frames a second that the Chinese paper prints for windows of 1 to 4 frames (table 1; one core of 2.8 GHz).
 const PAPER: [f64; 4] = [84.0, 59.0, 34.0, 20.0];
-/// Stages of a frame, in the order of the table.
-const STAGES: [(&str, Stage); 5] = [
-    ("query", Stage::Query),
-    ("search", Stage::Search),
-    ("prior", Stage::Prior),
-    ("MAP", Stage::Map),
-    ("rest", Stage::Rest),
+/// Parts of a frame, in the order of the table.
+const PARTS: [(&str, FramePart); 5] = [
+    ("query", FramePart::Query),
+    ("search", FramePart::Search),
+    ("prior", FramePart::Prior),
+    ("MAP", FramePart::Map),
+    ("rest", FramePart::Rest),
 ];
 
 /// Time a whole frame of reconstruction takes on one thread, and its parts
@@ -119,14 +119,14 @@ struct Report<'a> {
     threads: usize,
 }
 
-/// Takes the times of stages as they begin, frame by frame.
+/// Takes the times of parts as they begin, frame by frame.
 struct Watch {
     frame_began: Instant,
-    stage_began: Instant,
-    stage: Option<Stage>,
+    part_began: Instant,
+    part: Option<FramePart>,
     has_start: bool,
-    now: [f64; STAGES.len()],
-    steady: Vec<(f64, [f64; STAGES.len()])>,
+    now: [f64; PARTS.len()],
+    steady: Vec<(f64, [f64; PARTS.len()])>,
     starts: Vec<f64>,
 }
 
@@ -135,10 +135,10 @@ impl Watch {
         let now = Instant::now();
         Self {
             frame_began: now,
-            stage_began: now,
-            stage: None,
+            part_began: now,
+            part: None,
             has_start: false,
-            now: [0.0; STAGES.len()],
+            now: [0.0; PARTS.len()],
             steady: Vec::new(),
             starts: Vec::new(),
         }
@@ -150,26 +150,26 @@ impl Watch {
     }
 
     fn begin_frame(&mut self, at: Instant) {
-        (self.frame_began, self.stage_began, self.stage) = (at, at, None);
-        (self.has_start, self.now) = (false, [0.0; STAGES.len()]);
+        (self.frame_began, self.part_began, self.part) = (at, at, None);
+        (self.has_start, self.now) = (false, [0.0; PARTS.len()]);
     }
 
-    fn end_stage(&mut self, at: Instant) {
-        if let Some(slot) = STAGES.iter().position(|(_, stage)| Some(*stage) == self.stage) {
-            self.now[slot] += (at - self.stage_began).as_secs_f64();
+    fn end_part(&mut self, at: Instant) {
+        if let Some(slot) = PARTS.iter().position(|(_, part)| Some(*part) == self.part) {
+            self.now[slot] += (at - self.part_began).as_secs_f64();
         }
     }
 
-    fn begin(&mut self, stage: Stage) {
+    fn begin(&mut self, part: FramePart) {
         let at = Instant::now();
-        self.end_stage(at);
-        self.has_start |= stage == Stage::Start;
-        (self.stage, self.stage_began) = (Some(stage), at);
+        self.end_part(at);
+        self.has_start |= part == FramePart::Start;
+        (self.part, self.part_began) = (Some(part), at);
     }
 
     fn end_frame(&mut self) {
         let at = Instant::now();
-        self.end_stage(at);
+        self.end_part(at);
         let whole = (at - self.frame_began).as_secs_f64();
         if self.has_start {
             self.starts.push(whole);
@@ -180,11 +180,11 @@ impl Watch {
     }
 
     fn row(self, window: u8) -> Row {
-        let stage =
-            |slot: usize| Time::from_seconds(self.steady.iter().map(|(_, stages)| stages[slot]).collect());
+        let part =
+            |slot: usize| Time::from_seconds(self.steady.iter().map(|(_, parts)| parts[slot]).collect());
         let frame = Time::from_seconds(self.steady.iter().map(|(whole, _)| *whole).collect());
         let seconds = self.steady.iter().map(|(whole, _)| whole).chain(&self.starts).sum::<f64>();
-        let [query, search, prior, map, rest] = [0, 1, 2, 3, 4].map(stage);
+        let [query, search, prior, map, rest] = [0, 1, 2, 3, 4].map(part);
         Row {
             window,
             frames: self.steady.len(),
@@ -283,10 +283,10 @@ fn measure(args: &Args, database: &MotionDatabase, trials: &[Clip], window: u8) 
         let skeleton = trial.motion.skeleton().clone();
         let points = control_points(&skeleton, names)?;
         let session = Session::new(skeleton, points, &control_trajectories(&trial.motion, names)?)?;
-        let watcher = |stage| locked().begin(stage);
+        let watcher = |part| locked().begin(part);
         let mut reconstructor =
             Reconstructor::new(database, &index, &session, &parameters)?.watched(&watcher);
-        reconstructor.exclude(|clip| trial_of(&clip.name) == trial_of(&trial.name));
+        reconstructor.exclude(|clip| trial_name(&clip.name) == trial_name(&trial.name));
         let frames = session.num_frames().min(args.frames);
         locked().begin_trial();
         reconstructor

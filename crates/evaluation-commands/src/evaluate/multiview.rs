@@ -180,7 +180,7 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn new(model: &'a BodyModel, start: &Fit, training: &[Vec<f64>], args: &Args) -> anyhow::Result<Self> {
-        let particles = ParticleOptions { session: args.seed, ..ParticleOptions::default() };
+        let particles = ParticleOptions { seed: args.seed, ..ParticleOptions::default() };
         let tracker = |particles: Option<ParticleOptions>| {
             let options = Options { particles, ..Options::default() };
             Tracker::with_training_poses(model, &start.alpha, &start.pose, options, training.to_vec())

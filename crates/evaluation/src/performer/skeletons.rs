@@ -72,12 +72,12 @@ pub fn evaluate_skeletons(
     let SkeletonTrial { clip, database, .. } = trial;
     let truth = &clip.motion;
     let trajectories = control_trajectories(truth, names)?;
-    let population = Population::of(database).map_err(unfit)?;
+    let population = Population::from_database(database).map_err(unfit)?;
     let own = truth.skeleton().as_ref().clone();
     let base = control_points(database.skeleton(), names)?;
     let fitted = fit_skeleton(database, &base, &trajectories, settings).map_err(unfit)?;
     let on = |skeleton: &Skeleton| control_points(skeleton, names);
-    let limbs = Limbs::of(&own);
+    let limbs = Limbs::from_skeleton(&own);
     let (true_lengths, found_lengths) = (limbs.lengths(&own), limbs.lengths(&fitted.skeleton));
     let mut deviations = [0.0; 3];
     for (i, d) in deviations.iter_mut().enumerate() {
@@ -114,7 +114,7 @@ pub fn evaluate_skeletons(
 }
 
 fn lengths(skeleton: &Skeleton) -> [f64; 3] {
-    let sizes = Sizes::of(skeleton);
+    let sizes = Sizes::from_skeleton(skeleton);
     [sizes.height_m, sizes.arm_m, sizes.leg_m]
 }
 

@@ -177,9 +177,7 @@ pub fn recover(
 fn run(setting: &Setting<'_>, start: &Start, method: &Method<'_>) -> Result<Recovered> {
     let particles = match method.way {
         Way::Local => None,
-        Way::Search(options) | Way::Marey(options) => {
-            Some(ParticleOptions { session: setting.seed, ..options })
-        }
+        Way::Search(options) | Way::Marey(options) => Some(ParticleOptions { seed: setting.seed, ..options }),
     };
     let options = Options { particles, ..Options::default() };
     let training_poses = method.training_poses.to_vec();

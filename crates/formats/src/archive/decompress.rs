@@ -12,7 +12,7 @@ pub(super) enum Compression {
 
 impl Compression {
     /// By the first bytes.
-    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
+    pub(super) fn detect(bytes: &[u8]) -> Option<Self> {
         match bytes {
             [0x1f, 0x8b, ..] => Some(Self::Gzip),
             [0x28, 0xb5, 0x2f, 0xfd, ..] | [0x50..=0x5f, 0x2a, 0x4d, 0x18, ..] => Some(Self::Zstd),
@@ -101,7 +101,7 @@ mod tests {
 
     fn unpack(bytes: &[u8]) -> io::Result<Vec<u8>> {
         let mut out = Vec::new();
-        Compression::of(bytes).unwrap().reader(bytes).read_to_end(&mut out)?;
+        Compression::detect(bytes).unwrap().reader(bytes).read_to_end(&mut out)?;
         Ok(out)
     }
 

@@ -62,7 +62,7 @@ pub fn entries_where(
     mut is_wanted: impl FnMut(&str) -> bool,
 ) -> Result<Vec<Entry>> {
     let mut unpacking = Unpacking::new(limits, bytes.len(), &mut is_wanted);
-    match Kind::of(bytes) {
+    match Kind::detect(bytes) {
         Kind::Zip => zip::read(bytes, &mut unpacking)?,
         Kind::Tar => {
             let stream = unpacking.stream();
@@ -99,11 +99,11 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(bytes: &[u8]) -> Self {
+    fn detect(bytes: &[u8]) -> Self {
         if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06") {
             return Self::Zip;
         }
-        match Compression::of(bytes) {
+        match Compression::detect(bytes) {
             Some(compression) => Self::Compressed(compression),
             None if tar::is_header(bytes) => Self::Tar,
             None => Self::Plain,
@@ -144,7 +144,7 @@ impl<'a> Unpacking<'a> {
 
     /// Takes a member, unpacked if it is compressed singly.
     fn push_member(&mut self, member: &[u8], bytes: Vec<u8>) -> Result<()> {
-        match Compression::of(&bytes).filter(|c| c.is_named(member)) {
+        match Compression::detect(&bytes).filter(|c| c.is_named(member)) {
             None => self.push(member, bytes),
             Some(compression) => {
                 let unpacked = self.read(compression.name(), member, compression.reader(&bytes))?;

@@ -22,7 +22,7 @@ use crate::{
 /// channels, or a value is not finite. A wrong number of frames in the header is only a warning.
 pub fn read(bytes: &[u8], options: &Options) -> Result<Read<Motion>> {
     if !(options.metres_per_unit.is_finite() && options.metres_per_unit > 0.0) {
-        return Err(Error::of_file(
+        return Err(Error::whole_file(
             format!("{} metres per unit", options.metres_per_unit),
             "a positive number",
         ));

@@ -14,13 +14,13 @@ const ORTHONORMAL: f64 = 1e-3;
 pub(super) fn cameras(found: FileCameras, options: &Options, warnings: &mut Warnings) -> Result<Vec<Camera>> {
     let FileCameras { cameras: files, up: stated, metres } = found;
     if files.is_empty() {
-        return Err(Error::of_file(
+        return Err(Error::whole_file(
             "no camera",
             "at least one with a camera matrix, a rotation and a translation",
         ));
     }
     if files.len() > MOST_CAMERAS {
-        return Err(Error::of_file(format!("{} cameras", files.len()), format!("at most {MOST_CAMERAS}")));
+        return Err(Error::whole_file(format!("{} cameras", files.len()), format!("at most {MOST_CAMERAS}")));
     }
     let mut names = HashSet::new();
     if let Some(twice) = files.iter().find(|file| !names.insert(file.name.as_str())) {
@@ -29,7 +29,7 @@ pub(super) fn cameras(found: FileCameras, options: &Options, warnings: &mut Warn
     }
     let metres = options.metres_per_unit.or(metres).unwrap_or(1.0);
     if !(metres > 0.0 && metres.is_finite()) {
-        return Err(Error::of_file(format!("{metres} metres per unit"), "a positive number"));
+        return Err(Error::whole_file(format!("{metres} metres per unit"), "a positive number"));
     }
     let rotations = files.iter().map(rotation).collect::<Result<Vec<_>>>()?;
     let up = up_axis(stated, options.up, &rotations, warnings);

@@ -68,14 +68,17 @@ fn check_unit(
     }
     // poses given the other way round put all cameras at one place
     if distance < *DISTANCES.start() && look_inwards_if_inverted(cameras) {
-        return Err(Error::of_file(format!("cameras that stand {distance:.4} m from each other"), INVERTED));
+        return Err(Error::whole_file(
+            format!("cameras that stand {distance:.4} m from each other"),
+            INVERTED,
+        ));
     }
     let looks_like = match distance {
         _ if distance > 1000.0 => "looks like millimetres",
         _ if distance > 100.0 => "looks like centimetres",
         _ => "the unit is too large, or the calibration has no scale",
     };
-    Err(Error::of_file(
+    Err(Error::whole_file(
         format!("cameras that stand {distance:.4} from what they look at: {looks_like}"),
         "metres; give the file's unit if it is another",
     ))
@@ -97,7 +100,7 @@ fn check_directions(
         let hint = "cameras that look at the same, with x_camera = R x + t and z forward";
         let is_inverted = look_inwards_if_inverted(cameras);
         let hint = if is_inverted { INVERTED } else { hint };
-        return Err(Error::of_file(found, hint));
+        return Err(Error::whole_file(found, hint));
     }
     for (camera, off) in away {
         let message =
@@ -125,7 +128,7 @@ fn check_upper_sides(cameras: &[Camera], is_up_certain: bool, warnings: &mut War
     let upper_side = |camera: &Camera| (camera.camera_from_world.rotation.inverse() * -Vector3::y()).y;
     let down: Vec<_> = cameras.iter().filter(|camera| upper_side(camera) < -0.5).collect();
     if is_up_certain && 2 * down.len() > cameras.len() {
-        return Err(Error::of_file(
+        return Err(Error::whole_file(
             format!("{} of {} cameras upside down", down.len(), cameras.len()),
             "the floor below the cameras; give the axis that points up if the file has another",
         ));

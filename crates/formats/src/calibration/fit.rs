@@ -28,7 +28,7 @@ pub fn fit_to_image(camera: &Camera, size: [u32; 2]) -> Result<Read<Camera>> {
         camera.name, size[0], size[1], camera.size[0], camera.size[1]
     );
     if size.contains(&0) || size.iter().any(|&side| side > 1 << 15) {
-        return Err(Error::of_file(sizes, "a picture of 1 to 32768 pixels a side"));
+        return Err(Error::whole_file(sizes, "a picture of 1 to 32768 pixels a side"));
     }
     let is_portrait = |[width, height]: [u32; 2]| height > width;
     let mut camera = camera.clone();
@@ -37,7 +37,7 @@ pub fn fit_to_image(camera: &Camera, size: [u32; 2]) -> Result<Read<Camera>> {
         && ratio(size, [camera.size[1], camera.size[0]]) < MOST_BARS
     {
         let is_clockwise = sense_of_turn(&camera).ok_or_else(|| {
-            Error::of_file(sizes.clone(), "the size of the calibration, or a camera that lies on its side")
+            Error::whole_file(sizes.clone(), "the size of the calibration, or a camera that lies on its side")
         })?;
         let turns = if is_clockwise { 1 } else { 3 };
         camera = (0..turns).fold(camera, |camera, _| turned_clockwise(&camera));
@@ -46,7 +46,7 @@ pub fn fit_to_image(camera: &Camera, size: [u32; 2]) -> Result<Read<Camera>> {
     let [scale_x, scale_y] = [0, 1].map(|side| f64::from(size[side]) / f64::from(camera.size[side]));
     let off = ratio(size, camera.size);
     if off >= MOST_BARS {
-        return Err(Error::of_file(
+        return Err(Error::whole_file(
             sizes,
             "the calibration's size, or one with nearly the same ratio of the sides",
         ));

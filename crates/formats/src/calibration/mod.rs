@@ -68,7 +68,7 @@ struct FileCamera {
 pub fn read(name: &str, bytes: &[u8], options: &Options) -> Result<Read<Vec<Camera>>> {
     if bytes.len() > LARGEST {
         let found = format!("{} bytes", bytes.len());
-        return Err(Error::of_file(found, format!("a calibration of at most {LARGEST} bytes")));
+        return Err(Error::whole_file(found, format!("a calibration of at most {LARGEST} bytes")));
     }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let text = std::str::from_utf8(bytes).map_err(|error| {
@@ -76,7 +76,7 @@ pub fn read(name: &str, bytes: &[u8], options: &Options) -> Result<Read<Vec<Came
         at_byte(at as u64, quote(&bytes[at..bytes.len().min(at + 8)]), "text in UTF-8")
     })?;
     let mut warnings = Warnings::default();
-    let found = match Kind::of(name, text) {
+    let found = match Kind::detect(name, text) {
         Kind::Qualisys => qca::read(text, &mut warnings)?,
         Kind::Json => tree::read(name, &json(text)?, UpAxis::Y, &mut warnings)?,
         Kind::Toml => tree::read(name, &toml(text)?, UpAxis::Z, &mut warnings)?,
@@ -95,7 +95,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(name: &str, text: &str) -> Self {
+    fn detect(name: &str, text: &str) -> Self {
         let start = text.trim_start();
         let is_named = |ending: &str| name.to_ascii_lowercase().ends_with(ending);
         if start.starts_with('<') {

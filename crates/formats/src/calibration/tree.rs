@@ -56,14 +56,14 @@ pub(super) fn read(
     let up = match top.get("up") {
         None => Stated::Usual(usual),
         Some(up) => Stated::Certain(up.as_str().unwrap_or_default().parse().map_err(|_| {
-            Error::of_file(format!("up {}", quote(up.to_string().as_bytes())), "x, y, z, -x, -y or -z")
+            Error::whole_file(format!("up {}", quote(up.to_string().as_bytes())), "x, y, z, -x, -y or -z")
         })?),
     };
     let metres = match top.get("unit").or_else(|| top.get("units")) {
         None => None,
         Some(unit) => {
             Some(points::metres(unit.as_str().unwrap_or_default().as_bytes()).ok_or_else(|| {
-                Error::of_file(format!("unit {}", quote(unit.to_string().as_bytes())), "mm, cm, m or in")
+                Error::whole_file(format!("unit {}", quote(unit.to_string().as_bytes())), "mm, cm, m or in")
             })?)
         }
     };
@@ -79,14 +79,14 @@ struct Part<'a> {
 
 /// The parts of the tree that have a camera matrix.
 fn parts<'a>(file_name: &str, tree: &'a Value) -> Result<Vec<Part<'a>>> {
-    let of_list = |list: &'a [Value]| {
+    let parts_from = |list: &'a [Value]| {
         if list.len() > MOST_CAMERAS {
             let found = format!("{} cameras", list.len());
-            return Err(Error::of_file(found, format!("at most {MOST_CAMERAS}")));
+            return Err(Error::whole_file(found, format!("at most {MOST_CAMERAS}")));
         }
         let part = |(index, value): (usize, &'a Value)| {
             let map = value.as_object().ok_or_else(|| {
-                Error::of_file(
+                Error::whole_file(
                     format!("camera {index} is {}", quote(value.to_string().as_bytes())),
                     "an object",
                 )
@@ -96,11 +96,11 @@ fn parts<'a>(file_name: &str, tree: &'a Value) -> Result<Vec<Part<'a>>> {
         list.iter().enumerate().map(part).collect()
     };
     if let Some(list) = tree.as_array() {
-        return of_list(list);
+        return parts_from(list);
     }
     let Some(top) = tree.as_object() else { return Ok(Vec::new()) };
     match top.get("cameras") {
-        Some(Value::Array(list)) => return of_list(list),
+        Some(Value::Array(list)) => return parts_from(list),
         Some(Value::Object(map)) => return Ok(tables(map)),
         _ => {}
     }
@@ -161,7 +161,7 @@ impl Part<'_> {
     }
 
     fn error(&self, found: impl std::fmt::Display, expected: &str) -> Error {
-        Error::of_file(format!("camera {}: {found}", self.name), expected)
+        Error::whole_file(format!("camera {}: {found}", self.name), expected)
     }
 
     fn numbers(&self, what: &str, names: &[&str], counts: &[usize], expected: &str) -> Result<Vec<f64>> {
@@ -284,11 +284,11 @@ mod tests {
 
     #[test]
     fn a_matrix_has_as_many_numbers_as_it_says() {
-        let of = |text: &str| numbers(&serde_json::from_str(text).unwrap());
-        assert_eq!(of("[[1, 2], [3, 4]]"), Some(vec![1.0, 2.0, 3.0, 4.0]));
-        assert_eq!(of(r#"{"rows": 1, "cols": 2, "data": [1, 2]}"#), Some(vec![1.0, 2.0]));
-        assert_eq!(of(r#"{"rows": 2, "cols": 2, "data": [1, 2]}"#), None);
-        assert_eq!(of(r#"[1, "a"]"#), None);
-        assert_eq!(of(r#"{"data": {"data": [1]}}"#), None);
+        let parsed = |text: &str| numbers(&serde_json::from_str(text).unwrap());
+        assert_eq!(parsed("[[1, 2], [3, 4]]"), Some(vec![1.0, 2.0, 3.0, 4.0]));
+        assert_eq!(parsed(r#"{"rows": 1, "cols": 2, "data": [1, 2]}"#), Some(vec![1.0, 2.0]));
+        assert_eq!(parsed(r#"{"rows": 2, "cols": 2, "data": [1, 2]}"#), None);
+        assert_eq!(parsed(r#"[1, "a"]"#), None);
+        assert_eq!(parsed(r#"{"data": {"data": [1]}}"#), None);
     }
 }

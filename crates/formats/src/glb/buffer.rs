@@ -123,7 +123,7 @@ impl Buffer {
         document["accessors"] = Value::Array(self.accessors);
         let mut json = document.to_string().into_bytes();
         json.resize(json.len().next_multiple_of(4), b' ');
-        let too_large = |_| Error::of_file("a mesh of more than 4 GiB", "at most 4 GiB in a GLB");
+        let too_large = |_| Error::whole_file("a mesh of more than 4 GiB", "at most 4 GiB in a GLB");
         let length = 12 + 8 + json.len() + 8 + self.bytes.len();
         let length = u32::try_from(length).map_err(too_large)?;
         let mut glb = Vec::with_capacity(length as usize);

@@ -88,12 +88,12 @@ fn count(what: &str, found: usize, expected: usize) -> Result<()> {
     if found == expected {
         return Ok(());
     }
-    Err(Error::of_file(format!("{found} {what}"), format!("{expected}")))
+    Err(Error::whole_file(format!("{found} {what}"), format!("{expected}")))
 }
 
 fn primitive(buffer: &mut Buffer, mesh: &Mesh, normals: &[Vector3<f64>]) -> Result<Value> {
     if mesh.faces.is_empty() {
-        return Err(Error::of_file("a mesh without faces", "at least one face"));
+        return Err(Error::whole_file("a mesh without faces", "at least one face"));
     }
     // vertices without faces have no normal, and the format wants one
     let unit = |normal: &Vector3<f64>| normal.try_normalize(1e-12).unwrap_or_else(Vector3::y);

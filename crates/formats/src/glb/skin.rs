@@ -21,7 +21,7 @@ pub(super) fn attributes(body: &SkinnedMesh) -> Result<Influences> {
             if !(weight >= 0.0 && weight.is_finite()) || usize::from(joint) >= body.joints.len() {
                 let found = format!("weight {weight} of joint {joint} at vertex {vertex}");
                 let expected = format!("weights from 0 and joints below {}", body.joints.len());
-                return Err(Error::of_file(found, expected));
+                return Err(Error::whole_file(found, expected));
             }
             if weight == 0.0 {
                 continue;
@@ -33,7 +33,7 @@ pub(super) fn attributes(body: &SkinnedMesh) -> Result<Influences> {
         }
         let sum: f32 = sums.iter().sum();
         if !(sum > 0.0 && sum.is_finite()) {
-            return Err(Error::of_file(
+            return Err(Error::whole_file(
                 format!("vertex {vertex} without weights"),
                 "at least one joint that moves it",
             ));
@@ -53,12 +53,12 @@ pub(super) fn nodes(joints: &[Joint]) -> Result<Vec<Value>> {
             Some(parent) if parent < index => children[parent].push(index + 1),
             parent => {
                 let found = format!("joint {index} ({}) with parent {parent:?}", joint.name);
-                return Err(Error::of_file(found, "an earlier joint; only joint 0 is the root"));
+                return Err(Error::whole_file(found, "an earlier joint; only joint 0 is the root"));
             }
         }
     }
     if joints.is_empty() {
-        return Err(Error::of_file("no joint", "at least a root"));
+        return Err(Error::whole_file("no joint", "at least a root"));
     }
     let node = |(joint, children): (&Joint, Vec<usize>)| {
         let above = joint.parent.map_or_else(Vector3::zeros, |parent| joints[parent].rest_position);
@@ -82,7 +82,7 @@ pub(super) fn animation(buffer: &mut Buffer, joints: usize, animation: &Animatio
     let in_single: Vec<f32> = times.iter().map(|time| *time as f32).collect();
     let is_rising = in_single.windows(2).all(|pair| pair[0] < pair[1]);
     if frames == 0 || !is_rising || !(in_single[0] >= 0.0 && in_single[frames - 1].is_finite()) {
-        return Err(Error::of_file(
+        return Err(Error::whole_file(
             format!("{frames} times that do not rise from 0 or more"),
             "rising times",
         ));
@@ -94,14 +94,14 @@ pub(super) fn animation(buffer: &mut Buffer, joints: usize, animation: &Animatio
     for joint in 0..joints {
         // q and -q are the same rotation, but the way between frames must be the short one
         let mut last = [0.0_f64; 4];
-        let of_joint = rotations.iter().skip(joint).step_by(joints).map(|rotation| {
+        let joint_rotations = rotations.iter().skip(joint).step_by(joints).map(|rotation| {
             let c = rotation.coords;
             let is_far = c.iter().zip(last).map(|(a, b)| a * b).sum::<f64>() < 0.0;
             last = [c.x, c.y, c.z, c.w].map(|number| if is_far { -number } else { number });
             last.map(|number| number as f32)
         });
-        let of_joint: Vec<_> = of_joint.collect();
-        let output = buffer.rotations(&of_joint);
+        let joint_rotations: Vec<_> = joint_rotations.collect();
+        let output = buffer.rotations(&joint_rotations);
         channels
             .push(json!({ "sampler": samplers.len(), "target": { "node": joint + 1, "path": "rotation" } }));
         samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));

@@ -73,7 +73,7 @@ pub fn is_motion_file(name: &str) -> bool {
 /// # Errors
 /// If a file can't be read and is not to be skipped, or there is no motion at all. The file is named.
 pub fn clips(entries: &[Entry], options: &Options) -> Result<Read<Vec<MotionFile>>> {
-    let mut files: Vec<(Path<'_>, &Entry)> = entries.iter().map(|e| (Path::of(&e.name), e)).collect();
+    let mut files: Vec<(Path<'_>, &Entry)> = entries.iter().map(|e| (Path::from_name(&e.name), e)).collect();
     files.retain(|(path, _)| !path.is_hidden());
     files.sort_by(|(_, a), (_, b)| a.name.cmp(&b.name));
     let mut warnings = Vec::new();
@@ -119,7 +119,7 @@ pub fn clips(entries: &[Entry], options: &Options) -> Result<Read<Vec<MotionFile
         let skipped = warnings.iter().map(|w| w.message.as_str()).next();
         let found =
             skipped.map_or_else(|| format!("{} files, no motion among them", files.len()), str::to_owned);
-        return Err(Error::of_file(found, "at least one AMC file with its ASF file, or a BVH file"));
+        return Err(Error::whole_file(found, "at least one AMC file with its ASF file, or a BVH file"));
     }
     Ok(Read { value: clips, warnings })
 }

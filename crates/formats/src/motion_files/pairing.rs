@@ -39,15 +39,15 @@ impl<'e> Skeletons<'e> {
     }
 
     pub(super) fn read_amc(&self, path: &Path<'e>, bytes: &[u8], frame_rate: f64) -> Result<Read<Motion>> {
-        let skeleton = self.of(path).ok_or_else(|| {
+        let skeleton = self.skeleton_for(path).ok_or_else(|| {
             let found = format!("no ASF file for it among {}", self.list.len());
-            Error::of_file(found, format!("one such as {}.asf", path.subject()))
+            Error::whole_file(found, format!("one such as {}.asf", path.subject()))
         })?;
         let file = skeleton.get()?;
         amc::read(bytes, &file, frame_rate)
     }
 
-    fn of(&self, path: &Path<'e>) -> Option<&LazySkeleton<'e>> {
+    fn skeleton_for(&self, path: &Path<'e>) -> Option<&LazySkeleton<'e>> {
         let stem = path.stem.to_lowercase();
         let starts = || beginnings(&stem);
         let in_folder =

@@ -8,7 +8,7 @@ pub(super) struct Path<'e> {
 }
 
 impl<'e> Path<'e> {
-    pub(super) fn of(name: &'e str) -> Self {
+    pub(super) fn from_name(name: &'e str) -> Self {
         let (folder, file) = name.rsplit_once('/').unwrap_or(("", name));
         let (stem, extension) = file.rsplit_once('.').unwrap_or((file, ""));
         Self { folder, stem, extension }

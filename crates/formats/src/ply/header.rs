@@ -25,7 +25,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    fn of(word: &[u8]) -> Option<Self> {
+    fn from_word(word: &[u8]) -> Option<Self> {
         Some(match word {
             b"char" | b"int8" => Self::I8,
             b"uchar" | b"uint8" => Self::U8,
@@ -125,12 +125,13 @@ impl Header {
                         elements.last_mut().ok_or_else(|| wrong("an element before its properties"))?;
                     let first = words.next().unwrap_or_default();
                     let (count, kind) = if first == b"list" {
-                        (words.next().and_then(Kind::of), words.next().unwrap_or_default())
+                        (words.next().and_then(Kind::from_word), words.next().unwrap_or_default())
                     } else {
                         (None, first)
                     };
                     let is_list_complete = first != b"list" || count.is_some();
-                    let (Some(kind), Some(found), true) = (Kind::of(kind), words.next(), is_list_complete)
+                    let (Some(kind), Some(found), true) =
+                        (Kind::from_word(kind), words.next(), is_list_complete)
                     else {
                         return Err(wrong(
                             "property, a type such as float, or list and two types, and a name",

@@ -36,7 +36,7 @@ pub fn read(bytes: &[u8]) -> Result<Read<Mesh>> {
         }
     }
     if vertices.is_empty() {
-        return Err(Error::of_file("no vertex", "an element vertex with x, y and z"));
+        return Err(Error::whole_file("no vertex", "an element vertex with x, y and z"));
     }
     if polygons > 0 {
         let message = format!("{polygons} faces of more than three corners became triangles");
@@ -52,8 +52,8 @@ fn read_vertices(element: &Element, values: &mut Values<'_>, vertices: &mut Vec<
     let axis_of = |property: &Property| ["x", "y", "z"].iter().position(|axis| *axis == property.name);
     let axes: Vec<_> = element.properties.iter().map(axis_of).collect();
     for axis in 0..3 {
-        let of_axis = || element.properties.iter().zip(&axes).filter(|(_, found)| **found == Some(axis));
-        if of_axis().count() != 1 || of_axis().any(|(property, _)| property.count.is_some()) {
+        let on_axis = || element.properties.iter().zip(&axes).filter(|(_, found)| **found == Some(axis));
+        if on_axis().count() != 1 || on_axis().any(|(property, _)| property.count.is_some()) {
             return Err(Error::at_line(element.line, "an element vertex", "one number x, y and z each"));
         }
     }

@@ -10,9 +10,9 @@ const SYNTHETIC: &str = "data/multiview/synthetic-8cam";
 fn json_and_yaml_of_the_synthetic_capture_are_the_same_cameras() {
     let test = "json_and_yaml_of_the_synthetic_capture_are_the_same_cameras";
     let Some(folder) = testkit::shared::find(SYNTHETIC, test) else { return };
-    let of = |name: &str| read(name, &String::from_utf8(testkit::shared::read(&folder, name)).unwrap());
-    let (json, json_warnings) = of("calibration.json");
-    let (yaml, yaml_warnings) = of("calibration.yml");
+    let parsed = |name: &str| read(name, &String::from_utf8(testkit::shared::read(&folder, name)).unwrap());
+    let (json, json_warnings) = parsed("calibration.json");
+    let (yaml, yaml_warnings) = parsed("calibration.yml");
     assert_eq!((json_warnings, yaml_warnings), (vec![], vec![]));
     assert_eq!((json.len(), yaml.len()), (8, 8));
     let file: Value = serde_json::from_slice(&testkit::shared::read(&folder, "calibration.json")).unwrap();

@@ -84,12 +84,12 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn reprojection(folder: &Path, cameras: &[Camera]) -> Vec<f64> {
     let trc = testkit::shared::read(folder, "results/balancing_body25b.trc");
     let markers = trc::read(&trc, &PointsOptions::default()).unwrap().value;
-    let of_camera = |camera: &Camera| {
+    let from_camera = |camera: &Camera| {
         let mut distances = Vec::new();
         for frame in (0..markers.num_frames()).step_by(5) {
             let name = format!("pose/{0}_json/{0}.{frame:04}.json", camera.name);
             let detections: Value = serde_json::from_slice(&testkit::shared::read(folder, &name)).unwrap();
-            let of_person = |person: &Value| -> Vec<f64> {
+            let from_person = |person: &Value| -> Vec<f64> {
                 let number = |index: usize| person["pose_keypoints_2d"][index].as_f64().unwrap_or_default();
                 let mut distances = Vec::new();
                 for (point, name) in markers.names().iter().enumerate() {
@@ -106,13 +106,13 @@ fn reprojection(folder: &Path, cameras: &[Camera]) -> Vec<f64> {
                 distances
             };
             let people =
-                detections["people"].as_array().unwrap().iter().map(of_person).filter(|d| d.len() > 10);
+                detections["people"].as_array().unwrap().iter().map(from_person).filter(|d| d.len() > 10);
             let best = people.min_by(|a, b| median(a.clone()).total_cmp(&median(b.clone())));
             distances.extend(best.into_iter().flatten());
         }
         median(distances)
     };
-    cameras.iter().map(of_camera).collect()
+    cameras.iter().map(from_camera).collect()
 }
 
 #[test]

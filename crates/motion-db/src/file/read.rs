@@ -119,8 +119,8 @@ fn database(directory: &Directory, parts: &Parts<'_>) -> Found<MotionDatabase> {
     let zero_poses: Column<f32> = parts.column("zero poses", directory.clips.len().checked_mul(dofs))?;
     let mut clips = Vec::with_capacity(directory.clips.len());
     let mut first_pose = 0usize;
-    let of_clips = proportions.chunks_exact(each).zip(zero_poses.chunks_exact(dofs));
-    for (clip, (proportions, zero_pose)) in directory.clips.iter().zip(of_clips) {
+    let per_clip = proportions.chunks_exact(each).zip(zero_poses.chunks_exact(dofs));
+    for (clip, (proportions, zero_pose)) in directory.clips.iter().zip(per_clip) {
         let is_learned = zero_pose.iter().any(|o| *o != 0.0);
         clips.push(ClipInfo {
             name: clip.name.clone(),
@@ -156,7 +156,7 @@ fn windows(record: &WindowsRecord, database: &MotionDatabase, parts: &Parts<'_>)
     let prefix = parts.column("prefix", Some(Blocks::numbers(targets.len(), dims)))?;
     Ok(WindowIndex {
         window,
-        scale: FeatureScale::of(database),
+        scale: FeatureScale::from_database(database),
         mean: parts.column("mean", Some(width))?.to_vec(),
         axes: parts.column("axes", Some(width * width))?.to_vec(),
         prefix: Blocks::from_column(dims, prefix),
@@ -192,7 +192,7 @@ fn segments(record: &SegmentsRecord, rows: usize, width: usize, parts: &Parts<'_
         radius: parts.column("radius", Some(count))?,
         first: parts.column("first", Some(count))?,
         length: parts.column("length", Some(count))?,
-        of_row: parts.column("of-row", Some(rows))?,
+        by_row: parts.column("of-row", Some(rows))?,
         graph: parts.column("graph", Some(count * DEGREE))?,
         lists: Lists { centroids: parts.column("centroids", Some(lists))?, starts },
     })

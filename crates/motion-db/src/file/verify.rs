@@ -65,7 +65,7 @@ fn check_segments(segments: &Segments, num_rows: usize) -> Result<()> {
         rows += range.len();
         if range.len() != segments.length[segment] as usize
             || range.is_empty()
-            || range.clone().any(|row| segments.of_row[row] as usize != segment)
+            || range.clone().any(|row| segments.by_row[row] as usize != segment)
         {
             return odd(format!("segment {segment} with rows {range:?}"));
         }

@@ -88,7 +88,7 @@ fn write_segments(segments: &Segments, out: &mut Sections<'_>) -> Result<Segment
     out.section("radius", segments.radius.as_bytes())?;
     out.section("first", segments.first.as_bytes())?;
     out.section("length", segments.length.as_bytes())?;
-    out.section("of-row", segments.of_row.as_bytes())?;
+    out.section("of-row", segments.by_row.as_bytes())?;
     out.section("graph", segments.graph.as_bytes())?;
     out.section("centroids", segments.lists.centroids.as_bytes())?;
     out.section("starts", segments.lists.starts.as_bytes())?;

@@ -126,13 +126,13 @@ impl Objective {
         }
         let products = &coefficients * coefficients.transpose();
         gradient.copy_from_slice(x);
-        let (of_latent, of_kernel) = gradient.split_at_mut(count * dims);
-        (of_kernel[0], of_kernel[1]) = (1.0, -1.0);
+        let (by_latent, by_kernel) = gradient.split_at_mut(count * dims);
+        (by_kernel[0], by_kernel[1]) = (1.0, -1.0);
         for i in 0..count {
             for j in 0..count {
                 let slope = 0.5 * (used * kernel.inverse[(j, i)] - products[(j, i)]);
                 if i == j {
-                    of_kernel[1] += slope * kernel.noise;
+                    by_kernel[1] += slope * kernel.noise;
                     continue;
                 }
                 let along = slope * kernel.smooth[(j, i)] * kernel.inverse_width;
@@ -140,9 +140,9 @@ impl Objective {
                 for d in 0..dims {
                     let difference = latent[i * dims + d] - latent[j * dims + d];
                     squared += difference * difference;
-                    of_latent[i * dims + d] -= 2.0 * along * difference;
+                    by_latent[i * dims + d] -= 2.0 * along * difference;
                 }
-                of_kernel[0] -= 0.5 * along * squared;
+                by_kernel[0] -= 0.5 * along * squared;
             }
         }
         value

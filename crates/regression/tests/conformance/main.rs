@@ -202,9 +202,9 @@ fn the_prior_of_lpca_is_the_product_of_its_two_terms() {
         (0..40).map(|k| out.weights[k] * product(k)).sum()
     };
     // min_sigma is 1.
-    let of_components = Mat::from_fn(dofs, dofs, |d, e| spread(d, e) + if d == e { 1.0 } else { 0.0 });
+    let covariance = Mat::from_fn(dofs, dofs, |d, e| spread(d, e) + if d == e { 1.0 } else { 0.0 });
     let smoothness = 1.7f64.powi(-2);
-    let precision = of_components.partial_piv_lu().inverse();
+    let precision = covariance.partial_piv_lu().inverse();
     let both = Mat::from_fn(dofs, dofs, |d, e| precision[(d, e)] + if d == e { smoothness } else { 0.0 });
     let pulled = Mat::from_fn(dofs, 1, |d, _| {
         let onwards = 2.0 * case.recent[d] - case.recent[dofs + d];

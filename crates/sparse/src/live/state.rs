@@ -23,8 +23,9 @@ const MAX_COORDINATE: f64 = 1e6;
 
 #[derive(Serialize, Deserialize)]
 struct Header {
-    /// of database, skeleton, points and window
-    of: String,
+    /// fingerprint of database, skeleton, points and window
+    #[serde(rename = "of")]
+    origin: String,
     window: usize,
     dofs: usize,
     points: usize,
@@ -69,7 +70,7 @@ impl Live<'_> {
         let tracks = self.tracks();
         let challengers = &self.contest.challengers[..self.contest.active];
         let header = Header {
-            of: fingerprint(self.reconstructor),
+            origin: fingerprint(self.reconstructor),
             window: self.leader.history.len(),
             dofs: self.num_dofs(),
             points: self.positions.len(),
@@ -187,7 +188,7 @@ impl Live<'_> {
     }
 
     fn check(&self, header: &Header) -> Result<()> {
-        if header.of != fingerprint(self.reconstructor) {
+        if header.origin != fingerprint(self.reconstructor) {
             return Err(wrong(
                 "of another motion database, skeleton, choice of points or window",
                 "one of a stream that was started as this one is",
@@ -264,9 +265,10 @@ fn fingerprint(reconstructor: &Reconstructor<'_>) -> String {
         database.pose(pose).iter().for_each(|v| _ = hasher.update(&v.to_le_bytes()));
     }
     let points = session.points.iter().map(|p| (&p.name, p.joint, <[f64; 3]>::from(p.offset)));
-    let of = (SkeletonRecord::from(session.skeleton.as_ref()), points.collect::<Vec<_>>(), parameters.window);
+    let origin =
+        (SkeletonRecord::from(session.skeleton.as_ref()), points.collect::<Vec<_>>(), parameters.window);
     // Strings and finite numbers always are JSON.
-    hasher.update(&serde_json::to_vec(&of).unwrap_or_default());
+    hasher.update(&serde_json::to_vec(&origin).unwrap_or_default());
     hasher.finalize().to_hex().as_str().to_owned()
 }
 

@@ -82,8 +82,8 @@ pub fn carve_hull(views: &[HullView<'_>], options: &HullOptions) -> Result<Hull,
     let bounds = loop {
         let coarse = carve_coarsely(&cones, &root, options);
         let left_out = views.len() - kept.len();
-        for (&view, of_view) in kept.iter().zip(&coarse.agreement) {
-            agreement[view] = *of_view;
+        for (&view, coarse_agreement) in kept.iter().zip(&coarse.agreement) {
+            agreement[view] = *coarse_agreement;
         }
         match coarse.worst {
             Some(worst) if left_out < options.leave_out && cones.len() > 3 + options.tolerated => {

@@ -213,8 +213,8 @@ fn nearest_weights(point: &Vector3<f64>, [a, b, c]: &[Vector3<f64>; 3]) -> [f64;
     if d3 >= 0.0 && d4 <= d3 {
         return [0.0, 1.0, 0.0];
     }
-    let of_c = d1 * d4 - d3 * d2;
-    if of_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+    let weight_c = d1 * d4 - d3 * d2;
+    if weight_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
         let t = d1 / (d1 - d3);
         return [1.0 - t, t, 0.0];
     }
@@ -223,18 +223,18 @@ fn nearest_weights(point: &Vector3<f64>, [a, b, c]: &[Vector3<f64>; 3]) -> [f64;
     if d6 >= 0.0 && d5 <= d6 {
         return [0.0, 0.0, 1.0];
     }
-    let of_b = d5 * d2 - d1 * d6;
-    if of_b <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+    let weight_b = d5 * d2 - d1 * d6;
+    if weight_b <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
         let t = d2 / (d2 - d6);
         return [1.0 - t, 0.0, t];
     }
-    let of_a = d3 * d6 - d5 * d4;
-    if of_a <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+    let weight_a = d3 * d6 - d5 * d4;
+    if weight_a <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
         let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
         return [0.0, 1.0 - t, t];
     }
-    let sum = of_a + of_b + of_c;
-    [of_a / sum, of_b / sum, of_c / sum]
+    let sum = weight_a + weight_b + weight_c;
+    [weight_a / sum, weight_b / sum, weight_c / sum]
 }
 
 #[cfg(test)]

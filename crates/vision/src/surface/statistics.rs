@@ -22,7 +22,7 @@ pub struct DistanceStatistics {
 
 impl DistanceStatistics {
     /// Of signed distances, metres; all zero if there are none.
-    pub fn of(signed_m: &[f64]) -> Self {
+    pub fn from_distances(signed_m: &[f64]) -> Self {
         let count = signed_m.len();
         let mean = |sum: f64| if count == 0 { 0.0 } else { sum / count as f64 };
         let mean_signed_m = mean(signed_m.iter().sum());
@@ -59,14 +59,14 @@ pub fn compare_surfaces(
     samples: usize,
     seed: u64,
 ) -> Result<SurfaceComparison, Error> {
-    let (of_found, of_truth) = (Surface::new(found)?, Surface::new(truth)?);
-    let mut forth = of_truth.signed_distances(&sample_surface(found, samples, seed)?);
-    let mut back = of_found.signed_distances(&sample_surface(truth, samples, seed)?);
+    let (found_surface, true_surface) = (Surface::new(found)?, Surface::new(truth)?);
+    let mut forth = true_surface.signed_distances(&sample_surface(found, samples, seed)?);
+    let mut back = found_surface.signed_distances(&sample_surface(truth, samples, seed)?);
     back.iter_mut().for_each(|distance| *distance = -*distance);
-    let found_to_true = DistanceStatistics::of(&forth);
-    let true_to_found = DistanceStatistics::of(&back);
+    let found_to_true = DistanceStatistics::from_distances(&forth);
+    let true_to_found = DistanceStatistics::from_distances(&back);
     forth.append(&mut back);
-    Ok(SurfaceComparison { found_to_true, true_to_found, both: DistanceStatistics::of(&forth) })
+    Ok(SurfaceComparison { found_to_true, true_to_found, both: DistanceStatistics::from_distances(&forth) })
 }
 
 impl Surface {

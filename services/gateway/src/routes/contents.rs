@@ -216,7 +216,7 @@ pub(super) async fn check_clips(
     }
     let clips = clips(db, base.id).await?;
     let known: HashSet<&str> =
-        clips.iter().flat_map(|clip| [clip.name.as_str(), motion_db::trial_of(&clip.name)]).collect();
+        clips.iter().flat_map(|clip| [clip.name.as_str(), motion_db::trial_name(&clip.name)]).collect();
     match names.iter().find(|name| !known.contains(name.as_str())) {
         None => Ok(()),
         Some(name) => Err(Error::Unprocessable(format!(

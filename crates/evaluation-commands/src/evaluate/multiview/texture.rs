@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Context;
-use features::FeatureTracker;
+use features::FrameMatcher;
 use model::{Camera, PointMatch, Silhouette};
 use shape_fit::cleaned;
 use tracking::ObservedFrame;
@@ -14,7 +14,7 @@ use crate::evaluate::capture::Folder;
 /// One camera's pictures so far.
 #[derive(Default)]
 struct Pictures {
-    tracker: FeatureTracker,
+    matcher: FrameMatcher,
     /// index of the frame of the last one
     last: Option<usize>,
 }
@@ -46,7 +46,7 @@ impl Texture {
         for (camera, (pictures, (_, silhouette))) in self.cameras.iter_mut().zip(views).enumerate() {
             let Some(picture) = folder.picture(camera, number)? else { continue };
             let started = Instant::now();
-            let mut found = pictures.tracker.push(&picture, &cleaned(silhouette));
+            let mut found = pictures.matcher.push(&picture, &cleaned(silhouette));
             if let Some(last) = pictures.last.replace(frame.index) {
                 let back =
                     u32::try_from(frame.index - last).context("too many frames between two pictures")?;

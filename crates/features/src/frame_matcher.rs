@@ -4,13 +4,13 @@ use crate::{Detector, Features, Options, match_features};
 
 /// Matches each picture of a camera with the one before.
 #[derive(Debug, Default)]
-pub struct FeatureTracker {
+pub struct FrameMatcher {
     options: Options,
     detector: Detector,
     before: Features,
 }
 
-impl FeatureTracker {
+impl FrameMatcher {
     /// Before the first picture.
     pub fn new(options: Options) -> Self {
         Self { options, ..Self::default() }

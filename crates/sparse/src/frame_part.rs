@@ -1,6 +1,6 @@
 /// What a frame is made of, for whoever takes the time: see [`crate::Reconstructor::watched`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Stage {
+pub enum FramePart {
     /// the search for a pose to start from; frames follow on which the candidates are compared
     Start,
     /// the query: measurements in the heading frame, window features in principal axes
