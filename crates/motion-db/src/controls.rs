@@ -2,8 +2,8 @@ use kinematics::{Kinematics, PointSet};
 use model::Skeleton;
 use nalgebra::Vector3;
 
+use crate::blocks::Blocks;
 use crate::database::proportions;
-use crate::search::Blocks;
 use crate::segments::Segments;
 use crate::{ClipInfo, HeadingFrame, MotionDatabase, SkeletonSize, WindowIndex};
 

@@ -2,9 +2,12 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::blocks::LANES;
+use crate::candidate::{Candidate, drain_nearest_first};
 use crate::graph::DEGREE;
-use crate::search::{Candidate, LANES, drain_nearest_first};
-use crate::segments::{Lead, Segments};
+use crate::lead::Lead;
+use crate::scratch::FastScratch;
+use crate::segments::Segments;
 use crate::{Neighbour, Query, Scratch, WindowIndex};
 
 /// How much is looked at for 64 neighbours.
@@ -41,32 +44,6 @@ pub enum Way {
     Global,
     /// by looking at every window, because there are few
     Exact,
-}
-
-/// Memory of the fast search.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct FastScratch {
-    /// of the query, quantised
-    tail: Vec<i16>,
-    /// lists by distance
-    lists: Vec<u64>,
-    /// segments by distance
-    found: Vec<u64>,
-    /// when each segment was seen last: by the graph at `age`, in a list at `age + 1`
-    seen: Vec<u32>,
-    age: u32,
-}
-
-impl FastScratch {
-    fn start(&mut self, segments: usize) {
-        if self.seen.len() < segments || self.age > u32::MAX - 4 {
-            self.seen.clear();
-            self.seen.resize(segments, 0);
-            self.age = 0;
-        }
-        self.age += 2;
-        self.found.clear();
-    }
 }
 
 /// What is nearest comes first, and of equals the lowest number.

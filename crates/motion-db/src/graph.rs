@@ -1,8 +1,8 @@
 use pulp::Arch;
 
 use crate::Threads;
+use crate::lead::{Lead, step_distance};
 use crate::lists::Lists;
-use crate::segments::{Lead, step_distance};
 
 /// Neighbours of a segment in the graph.
 pub(crate) const DEGREE: usize = 16;

@@ -9,7 +9,9 @@
 //! - [`start_poses`]: the poses whose control points fit the first frames of a session best.
 
 mod augment;
+mod blocks;
 mod build;
+mod candidate;
 mod column;
 mod controls;
 mod database;
@@ -18,10 +20,13 @@ mod fast;
 mod file;
 mod frame;
 mod graph;
+mod lead;
 mod lists;
 mod mirror;
 mod parts;
 mod performers;
+mod query;
+mod scratch;
 mod search;
 mod segments;
 mod start;
@@ -39,7 +44,8 @@ pub use file::{FORMAT_VERSION, IndexFile, write_index};
 pub use frame::HeadingFrame;
 pub use mirror::mirror;
 pub use performers::ZeroPosePrior;
-pub use search::{Neighbour, Query, Scratch};
+pub use query::{Neighbour, Query};
+pub use scratch::Scratch;
 pub use start::{StartPose, start_poses};
 pub use start_scan::StartScan;
 pub use threads::{OneThread, Threads};

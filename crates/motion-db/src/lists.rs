@@ -2,7 +2,7 @@ use pulp::Arch;
 
 use crate::Threads;
 use crate::column::Column;
-use crate::segments::{LEAD, Lead, step_distance};
+use crate::lead::{LEAD, Lead, step_distance};
 
 /// Lists are as many as the root of the number of segments, times this: looking at all lists then costs about as much as
 /// looking into those that matter.

@@ -3,12 +3,8 @@
 use crate::Threads;
 use crate::column::Column;
 use crate::graph::neighbour_graph;
+use crate::lead::{LEAD, Lead, MAX_CENTRE, MAX_QUERY, quantised, quantised_lead, step_distance};
 use crate::lists::Lists;
-
-/// Leading principal features of a segment's centre that are always compared.
-pub(crate) const LEAD: usize = 32;
-/// Leading features of a centre, in steps of the quantisation.
-pub(crate) type Lead = [i16; LEAD];
 
 /// Most windows of a segment.
 const MAX_ROWS: usize = 8;
@@ -16,9 +12,6 @@ const MAX_ROWS: usize = 8;
 const MAX_STEPS: f32 = 8.0;
 /// Fewer segments than these are not worth a structure: all windows are looked at.
 const MIN_SEGMENTS: usize = 512;
-/// Largest quantised number of a centre, and of a query. Their differences fit 16 bits, 32 squared ones 32 bits.
-const MAX_CENTRE: f32 = 3_000.0;
-const MAX_QUERY: f32 = 8_000.0;
 const SEGMENTS_A_PIECE: usize = 512;
 
 /// All segments of an index, in the order of their lists.
@@ -202,29 +195,6 @@ impl Segments {
         let whole: f32 = a.iter().zip(b).map(|(x, y)| step_distance(x, y) as f32).sum();
         (whole + rest) / (self.scale * self.scale)
     }
-}
-
-/// Squared distance, steps². Never overflows: see [`MAX_QUERY`].
-#[inline(always)]
-pub(crate) fn step_distance(a: &Lead, b: &Lead) -> u32 {
-    let mut sum = 0i32;
-    for (x, y) in a.iter().zip(b) {
-        let d = i32::from(x.wrapping_sub(*y));
-        sum = sum.wrapping_add(d * d);
-    }
-    sum as u32
-}
-
-fn quantised(value: f32, scale: f32, max: f32) -> i16 {
-    (value * scale).round().clamp(-max, max) as i16
-}
-
-fn quantised_lead(features: &[f32], scale: f32, max: f32) -> Lead {
-    let mut lead = [0; LEAD];
-    for (out, v) in lead.iter_mut().zip(features) {
-        *out = quantised(*v, scale, max);
-    }
-    lead
 }
 
 pub(crate) fn squared_distance(a: &[f32], b: &[f32]) -> f32 {

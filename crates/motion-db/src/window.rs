@@ -2,8 +2,8 @@ use std::ops::Range;
 
 use faer::Mat;
 
+use crate::blocks::{Blocks, PREFIX};
 use crate::column::Column;
-use crate::search::{Blocks, PREFIX};
 use crate::segments::{Cutter, Segments, squared_distance};
 use crate::{Error, HeadingFrame, MotionDatabase, OneThread, Result, Threads};
 

@@ -4,14 +4,13 @@ use model::Motion;
 
 use crate::chance::{Chance, Purpose};
 use crate::features::{CHANNELS, CONTACT, TILT};
+use crate::frame_rate::FRAME_RATE;
 use crate::ground;
 use crate::movement::{Model, Movement};
 use crate::segment::piecewise;
 use crate::signal::{bend_into, smooth, smoothstep};
 use crate::{Action, Error, Result};
 
-/// Frames per second of a drawn motion.
-pub const FRAME_RATE: f64 = 60.0;
 /// Most frames of one drawn motion.
 const MOST_FRAMES: usize = 1 << 20;
 /// Share of the style's variance that a subject keeps from trial to trial.

@@ -6,10 +6,10 @@ use kinematics::{HEADING, Kinematics};
 use model::{Motion, Skeleton};
 use nalgebra::Vector3;
 
-use crate::draw::FRAME_RATE;
 use crate::features::{
     CHANNELS, CONTACT, DOFS, FORWARD, HEIGHT, Landmarks, SIDEWAYS, TILT, TURNING, parametrisation,
 };
+use crate::frame_rate::FRAME_RATE;
 use crate::movement::Model;
 use crate::signal::{smooth, smoothstep};
 use crate::{Error, Result};

@@ -23,6 +23,7 @@ mod draw;
 mod error;
 mod features;
 mod file;
+mod frame_rate;
 mod gait;
 mod ground;
 mod jumps;
@@ -33,9 +34,10 @@ mod segment;
 mod signal;
 
 pub use action::Action;
-pub use draw::{DrawOptions, FRAME_RATE};
+pub use draw::DrawOptions;
 pub use error::Error;
 pub use file::{CREDIT, MAX_BYTES, NOTICE};
+pub use frame_rate::FRAME_RATE;
 pub use learn::LabelledMotion;
 pub use movement::{Model, MovementSummary};
 

@@ -8,7 +8,9 @@ use kinematics::State;
 use model::Samples;
 use nalgebra::Vector3;
 
-use crate::tracker::{Observed, Step, Track, Tracker};
+use crate::frame_solver::FrameSolver;
+use crate::problem::Problem;
+use crate::track::{Observed, Step, Track};
 use crate::uncertainty::Uncertainty;
 use crate::{FrameQuality, Reconstructor, Result};
 use contest::Contest;
@@ -39,8 +41,8 @@ pub struct LivePose<'a> {
 /// computed when it comes, from what came before. A frame costs about the same whenever it comes: starts and re-entries
 /// after loss are spread over the frames, see [`Contest`]. Takes no memory once made.
 pub struct Live<'a> {
-    reconstructor: &'a Reconstructor<'a>,
-    tracker: Tracker<'a>,
+    problem: &'a Problem<'a>,
+    solver: FrameSolver<'a>,
     /// who is being followed; stands nowhere until `has_leader`
     leader: Track,
     has_leader: bool,
@@ -65,11 +67,12 @@ impl<'a> Live<'a> {
     /// # Errors
     /// If the method's model is missing.
     pub fn new(reconstructor: &'a Reconstructor<'a>) -> Result<Self> {
-        let Reconstructor { database, session, parameters, kinematics, .. } = reconstructor;
+        let problem = &reconstructor.problem;
+        let Problem { database, session, parameters, kinematics, .. } = problem;
         let (dofs, points) = (database.num_dofs(), session.points.len());
         Ok(Self {
-            reconstructor,
-            tracker: Tracker::new(reconstructor)?,
+            problem,
+            solver: FrameSolver::new(problem)?,
             leader: Track::blank(dofs, parameters),
             has_leader: false,
             contest: Contest::new(points, dofs, parameters),
@@ -82,7 +85,7 @@ impl<'a> Live<'a> {
             has_pose: false,
             joints: kinematics.state(),
             deviations: vec![0.0; dofs],
-            uncertainty: Uncertainty::new(&reconstructor.zero_pose_variance),
+            uncertainty: Uncertainty::new(&problem.zero_pose_variance),
         })
     }
 
@@ -134,24 +137,24 @@ impl<'a> Live<'a> {
             }
             self.contest.begin(&self.recent);
         }
-        let first = self.contest.search(self.reconstructor, &self.recent, &self.tracker)?;
-        self.has_leader = self.contest.take_first(&self.tracker, &mut self.leader, first);
+        let first = self.contest.search(self.problem, &self.recent)?;
+        self.has_leader = self.contest.take_first(&self.solver, &mut self.leader, first);
         self.uncertainty.restart();
         self.lost = 0;
         self.has_leader.then_some(())
     }
 
-    /// All tracks one frame further, the leader's last: the tracker then knows how sure it is.
+    /// All tracks one frame further, the leader's last: the solver then knows how sure it is.
     fn step(&mut self) -> Step {
         let samples = Samples { positions: &self.positions, sigmas: &self.sigmas };
-        self.contest.step(&mut self.tracker, samples);
-        self.tracker.step(&mut self.leader, Observed { now: samples, session: None })
+        self.contest.step(&mut self.solver, samples);
+        self.solver.step(&mut self.leader, Observed { now: samples, session: None })
     }
 
     fn quality(&mut self, step: &Step) -> FrameQuality {
         FrameQuality {
             residual_m: step.solution.residual_m,
-            sigma_rad: self.tracker.standard_deviations(&mut self.uncertainty, &mut self.deviations),
+            sigma_rad: self.solver.standard_deviations(&mut self.uncertainty, &mut self.deviations),
             energy: step.energy(),
             neighbour_distance_deg: step.neighbour_distance,
             measured_points: step.measured / 3,
@@ -160,7 +163,7 @@ impl<'a> Live<'a> {
 
     /// Goes on with the contest, and begins one when the leader has lost the way.
     fn look_for_others(&mut self, step: &Step) {
-        let parameters = self.reconstructor.parameters;
+        let parameters = self.problem.parameters;
         self.lost = if step.energy() > parameters.lost_energy { self.lost + 1 } else { 0 };
         if self.contest.is_over() {
             if self.lost >= parameters.lost_frames && self.recent.has_two() {
@@ -169,13 +172,13 @@ impl<'a> Live<'a> {
             }
             return;
         }
-        if self.contest.advance(self.reconstructor, &self.recent, &self.tracker, &mut self.leader, step) {
+        if self.contest.advance(self.problem, &self.recent, &self.solver, &mut self.leader, step) {
             self.uncertainty.restart();
         }
     }
 
     fn write_pose(&mut self) {
-        let Reconstructor { database, session, kinematics, .. } = self.reconstructor;
+        let Problem { database, session, kinematics, .. } = self.problem;
         let x = self.leader.newest();
         let previous = self.has_pose.then_some(&self.pose[..]);
         let parametrisation = database.parametrisation();

@@ -9,9 +9,11 @@ use std::sync::Arc;
 use motion_db::ZeroPosePrior;
 use nalgebra::{DMatrix, DVector};
 
-use crate::reconstruct::control_table_of;
-use crate::tracker::Tracker;
-use crate::{Parameters, Reconstructor, Result};
+use crate::frame_solver::FrameSolver;
+use crate::problem::{Problem, table_around};
+use crate::start::start;
+use crate::zero_pose_information::ZeroPoseInformation;
+use crate::{Parameters, Result};
 
 /// The first seconds are tracked and the offsets fitted so often.
 const ROUNDS: usize = 3;
@@ -20,54 +22,45 @@ const STRIDE: usize = 4;
 /// So many frames say as much as one that stands for itself: what a person's pose differs from its neighbours by lasts.
 const CORRELATED_FRAMES: f64 = 150.0;
 
-/// What measured frames say of the offsets: a Gaussian in information form.
-pub struct Information {
-    /// shape `[dofs, dofs]`
-    pub precision: DMatrix<f64>,
-    /// shape `[dofs]`
-    pub vector: DVector<f64>,
-}
-
-impl Reconstructor<'_> {
-    /// Learns the zero pose of a performer whose recordings the database does not hold, from the first frames
-    /// ([`Parameters::zero_pose_frames`]); without this call it is guessed from their skeleton. Does nothing for performers
-    /// in the database, or if [`Parameters::learn_zero_pose`] is off. Clips to be left out must have been excluded before
-    /// the database was built: the zero poses of others are made from them.
-    ///
-    /// # Errors
-    /// If no start pose is found or the method's model is missing.
-    pub fn learn_zero_pose(&mut self) -> Result<()> {
-        let prior = self.database.zero_pose_prior(&self.session.skeleton);
-        let Parameters { learn_zero_pose, zero_pose_frames, .. } = *self.parameters;
-        if prior.is_known || !learn_zero_pose {
-            return Ok(());
-        }
-        let Some(prior) = FreePrior::new(&prior) else { return Ok(()) };
-        let frames = zero_pose_frames;
-        let dofs = self.database.num_dofs();
-        for _ in 0..ROUNDS {
-            let mut information =
-                Information { precision: DMatrix::zeros(dofs, dofs), vector: DVector::zeros(dofs) };
-            let mut tracker = Tracker::new(self)?;
-            let begun = self.start(&mut tracker, 0, None)?;
-            let mut track = begun.track;
-            let end = (begun.frame + frames).min(self.session.num_frames());
-            for frame in begun.frame..end {
-                tracker.step(&mut track, self.observed(frame));
-                if (frame - begun.frame).is_multiple_of(STRIDE) {
-                    tracker.add_zero_pose_information(STRIDE as f64 / CORRELATED_FRAMES, &mut information);
-                }
-            }
-            drop(tracker);
-            let Some((learned, variance)) = prior.given(&information) else { break };
-            self.zero_pose = learned;
-            self.zero_pose_variance = variance;
-            let table =
-                control_table_of(self.database, self.index, self.session, &self.zero_pose, self.around)?;
-            self.table = Arc::new(table);
-        }
-        Ok(())
+/// Learns the performer's zero pose from the session's first frames, see [`crate::Reconstructor::learn_zero_pose`].
+///
+/// # Errors
+/// If no start pose is found or the method's model is missing.
+pub(crate) fn learn_zero_pose(problem: &mut Problem<'_>) -> Result<()> {
+    let prior = problem.database.zero_pose_prior(&problem.session.skeleton);
+    let Parameters { learn_zero_pose, zero_pose_frames, .. } = *problem.parameters;
+    if prior.is_known || !learn_zero_pose {
+        return Ok(());
     }
+    let Some(prior) = FreePrior::new(&prior) else { return Ok(()) };
+    let frames = zero_pose_frames;
+    let dofs = problem.database.num_dofs();
+    for _ in 0..ROUNDS {
+        let mut information = ZeroPoseInformation::none(dofs);
+        let mut solver = FrameSolver::new(problem)?;
+        let begun = start(problem, &mut solver, 0, None)?;
+        let mut track = begun.track;
+        let end = (begun.frame + frames).min(problem.session.num_frames());
+        for frame in begun.frame..end {
+            solver.step(&mut track, problem.observed(frame));
+            if (frame - begun.frame).is_multiple_of(STRIDE) {
+                solver.add_zero_pose_information(STRIDE as f64 / CORRELATED_FRAMES, &mut information);
+            }
+        }
+        drop(solver);
+        let Some((learned, variance)) = prior.given(&information) else { break };
+        problem.zero_pose = learned;
+        problem.zero_pose_variance = variance;
+        let table = table_around(
+            problem.database,
+            problem.index,
+            problem.session,
+            &problem.zero_pose,
+            problem.around,
+        )?;
+        problem.table = Arc::new(table);
+    }
+    Ok(())
 }
 
 /// A prior over those offsets that may differ from 0.
@@ -91,7 +84,7 @@ impl FreePrior {
     }
 
     /// The most probable offsets and their variances, shape `[dofs]`, radians.
-    fn given(&self, information: &Information) -> Option<(Vec<f64>, Vec<f64>)> {
+    fn given(&self, information: &ZeroPoseInformation) -> Option<(Vec<f64>, Vec<f64>)> {
         let free = &self.free;
         let count = free.len();
         let measured = DMatrix::from_fn(count, count, |a, b| information.precision[(free[a], free[b])]);

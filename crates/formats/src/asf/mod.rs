@@ -2,6 +2,7 @@
 
 mod bones;
 mod read;
+mod sections;
 mod tree;
 mod write;
 

@@ -7,7 +7,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::{
     File,
-    read::{Children, RawBone, Root, Units},
+    sections::{Children, RawBone, Root, Units},
 };
 use crate::{Error, Place, Result, euler, read::Warnings, text::quote};
 

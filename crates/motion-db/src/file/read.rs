@@ -8,12 +8,13 @@ use super::layout::{
     Directory, END, HEAD, MAGIC, Section, SegmentsRecord, TAIL, WindowsRecord, checksum, wrong,
 };
 use super::{FORMAT_VERSION, IndexFile};
+use crate::blocks::{Blocks, PREFIX};
 use crate::build::MAX_POSES;
 use crate::column::Column;
 use crate::graph::DEGREE;
+use crate::lead::LEAD;
 use crate::lists::Lists;
-use crate::search::{Blocks, PREFIX};
-use crate::segments::{LEAD, Segments};
+use crate::segments::Segments;
 use crate::window::{check_window, rows};
 use crate::{ClipInfo, Error, FeatureScale, MotionDatabase, Result, WindowIndex};
 

@@ -1,4 +1,4 @@
-use crate::gplvm::TrainingSet;
+use crate::gplvm::training_set::TrainingSet;
 
 /// Poses among which the active set is sought, at most.
 const CANDIDATES: usize = 6_000;

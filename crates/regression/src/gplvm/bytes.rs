@@ -1,8 +1,9 @@
 //! The file of a trained model: 8 letters, u32 version, u32 dofs, latent dimensions and active poses, then f64: γ, β⁻¹,
 //! μ, w⁻², latent points, features; last a BLAKE3 checksum of all before. Little-endian.
 
-use crate::gplvm::model::Stored;
-use crate::gplvm::{Gplvm, TrainingOptions};
+use crate::gplvm::model::Gplvm;
+use crate::gplvm::stored::Stored;
+use crate::gplvm::training::TrainingOptions;
 use crate::{Error, Result};
 
 const MAGIC: &[u8; 8] = b"MAREYGPL";

@@ -22,13 +22,17 @@
 
 mod active_set;
 mod bytes;
+mod kernel;
 mod lbfgs;
 mod linearisation;
 mod model;
 mod objective;
 mod predictor;
+mod stored;
 mod training;
+mod training_set;
 
 pub use model::Gplvm;
 pub use predictor::{GplvmParameters, GplvmPredictor};
-pub use training::{TrainingOptions, TrainingSet, train};
+pub use training::{TrainingOptions, train};
+pub use training_set::TrainingSet;

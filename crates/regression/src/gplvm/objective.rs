@@ -1,7 +1,9 @@
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 
-use crate::gplvm::Gplvm;
+use crate::gplvm::kernel::smooth_kernel;
+use crate::gplvm::model::Gplvm;
+use crate::gplvm::stored::Stored;
 use crate::{Error, Result};
 
 /// Variance of a feature that is not the latent variables' to explain, squared units per pose.
@@ -158,7 +160,7 @@ impl Objective {
         let (variances, _) = self.scales(&kernel);
         let width = self.features.ncols();
         let features = (0..count * width).map(|i| self.features[(i / width, i % width)]).collect();
-        Gplvm::new(crate::gplvm::model::Stored {
+        Gplvm::new(Stored {
             dofs: self.dofs,
             latent_dims: dims,
             inverse_width: kernel.inverse_width,
@@ -169,16 +171,6 @@ impl Objective {
             features,
         })
     }
-}
-
-/// `exp(−γ/2 ‖x_i − x_j‖²)` of latent points, row-major.
-pub fn smooth_kernel(latent: &[f64], dims: usize, inverse_width: f64) -> Mat<f64> {
-    let count = latent.len() / dims;
-    Mat::from_fn(count, count, |i, j| {
-        let (a, b) = (&latent[i * dims..(i + 1) * dims], &latent[j * dims..(j + 1) * dims]);
-        let squared: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
-        (-0.5 * inverse_width * squared).exp()
-    })
 }
 
 fn means(rows: &[f64], width: usize) -> Vec<f64> {

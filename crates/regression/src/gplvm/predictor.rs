@@ -1,6 +1,5 @@
-use crate::gplvm::Gplvm;
 use crate::gplvm::linearisation::{Linearisation, Terms, energy};
-use crate::gplvm::model::At;
+use crate::gplvm::model::{At, Gplvm};
 use crate::{Examples, Parameters, Prediction, Predictor, Query};
 
 /// Steps to the latent point of a first guess.

@@ -2,10 +2,12 @@ use model::Samples;
 use motion_db::{StartPose, StartScan};
 
 use super::recent::Recent;
-use crate::tracker::{Observed, Step, Track, Tracker};
-use crate::{Parameters, Reconstructor};
+use crate::Parameters;
+use crate::frame_solver::FrameSolver;
+use crate::problem::Problem;
+use crate::track::{Observed, Step, Track};
 
-/// Tracks that run beside the leader at once: with it, four steps of the tracker a frame.
+/// Tracks that run beside the leader at once: with it, four steps a frame.
 pub(super) const CHALLENGERS: usize = 3;
 /// Samples (poses × frames × points) that the search looks at in one frame: about a millisecond.
 const SEARCH_WORK: usize = 400_000;
@@ -36,7 +38,7 @@ pub(super) enum Phase {
 /// Finds out, without stopping, where the performer is.
 ///
 /// The database is searched in slices for poses that fit the last frames; the best three then run beside the leader for a
-/// heat, and who made the measurements most probable leads on (evidence as in [`Reconstructor::reconstruct`], method §2,
+/// heat, and who made the measurements most probable leads on (evidence as in [`crate::Reconstructor::reconstruct`], method §2,
 /// mend 8). Heats go on until as many frames as a start looks at were seen and the `start_candidates` best poses for
 /// these have run. The first search has one frame to go by; its best pose leads until there is a better one.
 #[derive(Debug, Clone)]
@@ -98,17 +100,12 @@ impl Contest {
     }
 
     /// Searches on; at its end, the number of poses found, which then are in `found`.
-    pub fn search(
-        &mut self,
-        reconstructor: &Reconstructor<'_>,
-        recent: &Recent,
-        tracker: &Tracker<'_>,
-    ) -> Option<usize> {
+    pub fn search(&mut self, problem: &Problem<'_>, recent: &Recent) -> Option<usize> {
         if self.phase != Phase::Search {
             return None;
         }
-        let Reconstructor { database, exclude_poses, .. } = reconstructor;
-        if !self.scan.advance(database, tracker.table, exclude_poses, SEARCH_WORK) {
+        let Problem { database, table, exclude_poses, .. } = problem;
+        if !self.scan.advance(database, table, exclude_poses, SEARCH_WORK) {
             return None;
         }
         let span = self.scan.span();
@@ -116,29 +113,29 @@ impl Contest {
         recent.observe(&mut self.scan);
         // The oldest frame observed is later now by the frames that came and are not observed in addition.
         let later = (recent.count() - self.begun_at + span).saturating_sub(self.scan.span());
-        self.scan.finish(database, tracker.table, exclude_poses, later, &mut self.found);
+        self.scan.finish(database, table, exclude_poses, later, &mut self.found);
         Some(self.found.len())
     }
 
     /// Puts the first of the poses found into `leader`, and the next ones into a heat with it. `false` if none was found.
-    pub fn take_first(&mut self, tracker: &Tracker<'_>, leader: &mut Track, found: usize) -> bool {
+    pub fn take_first(&mut self, solver: &FrameSolver<'_>, leader: &mut Track, found: usize) -> bool {
         if found == 0 {
             self.end();
             return false;
         }
         // Found for this frame; it is the next step that comes to it.
-        tracker.place(&before(&self.found[0]), leader);
-        self.begin_heat(tracker, 1, true);
+        solver.place(&before(&self.found[0]), leader);
+        self.begin_heat(solver, 1, true);
         true
     }
 
     /// `is_now`: the poses found are those of a frame that the tracks have not come to yet.
-    fn begin_heat(&mut self, tracker: &Tracker<'_>, first: usize, is_now: bool) {
+    fn begin_heat(&mut self, solver: &FrameSolver<'_>, first: usize, is_now: bool) {
         let challengers = self.challengers.iter_mut().zip(self.found.iter().skip(first));
         self.active = 0;
         for (challenger, start) in challengers {
             let start = if is_now { before(start) } else { *start };
-            tracker.place(&start, &mut challenger.track);
+            solver.place(&start, &mut challenger.track);
             challenger.surprise = 0.0;
             self.active += 1;
         }
@@ -147,11 +144,11 @@ impl Contest {
     }
 
     /// All challengers one frame further.
-    pub fn step(&mut self, tracker: &mut Tracker<'_>, samples: Samples<'_>) {
+    pub fn step(&mut self, solver: &mut FrameSolver<'_>, samples: Samples<'_>) {
         let Phase::Heat { left } = self.phase else { return };
         let counts = left + WARM_FRAMES <= self.heat_frames;
         for challenger in &mut self.challengers[..self.active] {
-            let surprise = tracker
+            let surprise = solver
                 .step(&mut challenger.track, Observed { now: samples, session: None })
                 .solution
                 .surprise();
@@ -165,21 +162,21 @@ impl Contest {
     /// now.
     pub fn advance(
         &mut self,
-        reconstructor: &Reconstructor<'_>,
+        problem: &Problem<'_>,
         recent: &Recent,
-        tracker: &Tracker<'_>,
+        solver: &FrameSolver<'_>,
         leader: &mut Track,
         step: &Step,
     ) -> bool {
         match self.phase {
             Phase::Over => {}
             Phase::Search => {
-                if self.search(reconstructor, recent, tracker).is_some() {
+                if self.search(problem, recent).is_some() {
                     let first = self.tried;
                     if recent.is_full() {
                         self.tried += CHALLENGERS;
                     }
-                    self.begin_heat(tracker, first, false);
+                    self.begin_heat(solver, first, false);
                 }
             }
             Phase::Heat { left } => {

@@ -9,8 +9,9 @@ use serde::{Deserialize, Serialize};
 use super::contest::{CHALLENGERS, Phase};
 use super::{Live, MAX_DISTANCE_M};
 use crate::bytes::{Reader, Writer};
-use crate::tracker::Track;
-use crate::{Error, Reconstructor, Result};
+use crate::problem::Problem;
+use crate::track::Track;
+use crate::{Error, Result};
 
 const MAGIC: &[u8; 8] = b"MAREYLV1";
 const WHAT: &str = "live state";
@@ -70,7 +71,7 @@ impl Live<'_> {
         let tracks = self.tracks();
         let challengers = &self.contest.challengers[..self.contest.active];
         let header = Header {
-            origin: fingerprint(self.reconstructor),
+            origin: fingerprint(self.problem),
             window: self.leader.history.len(),
             dofs: self.num_dofs(),
             points: self.positions.len(),
@@ -188,13 +189,13 @@ impl Live<'_> {
     }
 
     fn check(&self, header: &Header) -> Result<()> {
-        if header.origin != fingerprint(self.reconstructor) {
+        if header.origin != fingerprint(self.problem) {
             return Err(wrong(
                 "of another motion database, skeleton, choice of points or window",
                 "one of a stream that was started as this one is",
             ));
         }
-        let parameters = self.reconstructor.parameters;
+        let parameters = self.problem.parameters;
         let found = [header.window, header.dofs, header.points];
         let expected = [self.leader.history.len(), self.num_dofs(), self.positions.len()];
         if found != expected {
@@ -216,7 +217,7 @@ impl Live<'_> {
                 format!("of {} tracks and {} surprises", header.matches.len(), header.surprises.len());
             return Err(wrong(found, format!("a leader and at most {CHALLENGERS} challengers")));
         }
-        let rows = self.reconstructor.index.num_rows();
+        let rows = self.problem.index.num_rows();
         for matches in &header.matches {
             if matches.len() > 1024 || matches.iter().any(|row| *row >= rows) {
                 let found =
@@ -253,8 +254,8 @@ fn check_variances(variances: &[f64]) -> Result<()> {
 }
 
 /// What a state is only good for: the clips, the skeleton, the points and the window.
-fn fingerprint(reconstructor: &Reconstructor<'_>) -> String {
-    let Reconstructor { database, session, parameters, .. } = reconstructor;
+fn fingerprint(problem: &Problem<'_>) -> String {
+    let Problem { database, session, parameters, .. } = problem;
     let mut hasher = blake3::Hasher::new();
     for clip in database.clips() {
         hasher.update(&(clip.name.len() as u64).to_le_bytes());

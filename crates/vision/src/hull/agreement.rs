@@ -3,8 +3,8 @@ use nalgebra::Vector3;
 
 use super::{
     HullOptions,
-    bounds::Cube,
     cone::{Cone, Verdict},
+    cube::Cube,
 };
 
 /// How a view agrees with the others.

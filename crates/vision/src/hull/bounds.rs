@@ -1,14 +1,6 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use super::cone::Cone;
-
-/// A cube, metres.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Cube {
-    pub centre: Vector3<f64>,
-    /// half a side
-    pub half: f64,
-}
+use super::{cone::Cone, cube::Cube};
 
 /// A cube with all of the person: around the place nearest to the axes of the cones (least absolute distances, so that a
 /// view that is wrong has little say), as large as the widest cone is there, and half as much again.

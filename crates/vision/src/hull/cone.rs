@@ -1,7 +1,7 @@
 use model::Silhouette;
 use nalgebra::Vector3;
 
-use super::{HullView, bounds::Cube};
+use super::{HullView, cube::Cube};
 use crate::{DistanceField, View, raster::set_span, reduced};
 
 /// What one view says of places in space.

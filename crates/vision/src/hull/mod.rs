@@ -5,6 +5,7 @@ mod agreement;
 mod bounds;
 mod components;
 mod cone;
+mod cube;
 mod field;
 mod marching_cubes;
 
