@@ -1,5 +1,5 @@
 //! The morphable body: a mesh whose shape was learned from registered scans, a skeleton inside it, and a skin that follows
-//! the skeleton (method §4; MM §3, eq. 1).
+//! the skeleton (docs/papers.md#morphable-model, eq. 1).
 //!
 //! `M(α) = m₀ + Σ α_i m_i`: up to 20 principal components, α in standard deviations of the population. The joints are a
 //! linear function of the vertices, so they follow the shape. A pose has 22 degrees of freedom: 6 of the root and 16

@@ -1,5 +1,5 @@
-//! How far feet slide while they stand (method §6). What stands is decided here, by thresholds of its own, so that whoever holds feet
-//! is not judged by their own idea of a contact.
+//! How far feet slide while they stand (docs/papers.md#foot-contacts). What stands is decided here, by thresholds of
+//! its own, so that whoever holds feet is not judged by their own idea of a contact.
 
 use contacts::Feet;
 use model::Motion;

@@ -1,4 +1,4 @@
-//! How far a reconstruction is from the truth, and the protocols under which that is asked (method §2).
+//! How far a reconstruction is from the truth, and the protocols under which that is asked (docs/papers.md).
 //!
 //! - [`compare`], [`compare_in_detail`]: all metrics of one trial, always together; by frame and by joint.
 //! - [`foot_slide`], [`Calibration`]: whether standing feet stand, and whether errors are as large as stated.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub struct ControlSet;
 
 impl ControlSet {
-    /// Names of the set of `count` points, 2 to 6 (method §1); `None` for other numbers.
+    /// Names of the set of `count` points, 2 to 6 (docs/papers.md#notation); `None` for other numbers.
     pub fn names(count: usize) -> Option<&'static [&'static str]> {
         const ALL: [&str; 6] = ["left_wrist", "right_wrist", "left_ankle", "right_ankle", "root", "head"];
         match count {

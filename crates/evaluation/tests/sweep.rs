@@ -161,7 +161,7 @@ fn the_papers_are_beside(tables: &[Table]) {
     let databases = named(tables, "Database size, beside");
     // 150 poses ask for two clips of 120.
     assert_eq!(databases.columns[3..5], ["240 poses", "480 poses"]);
-    assert!(databases.columns.contains(&"paper, LR-zh 1.2 M".to_owned()));
+    assert!(databases.columns.contains(&"paper, Liu 1.2 M".to_owned()));
     let points = named(tables, "Control points, beside");
     let paper = points.rows.iter().find(|r| r[1] == Cell::text("paper")).unwrap();
     assert_eq!(paper[2..], [Cell::Number(2.67, 2)]);

@@ -12,7 +12,8 @@ pub struct ImageView {
     pub support: Support,
 }
 
-/// The overlap h of a chain with images, and its gradient (method §3.2; eq. 5 to 8 of the paper, mended).
+/// The overlap h of a chain with images, and its gradient (docs/papers.md#image-constrained-inverse-kinematics, eq.
+/// 5–8, changed).
 ///
 /// h is the mean of the supports at samples spaced evenly along the projections of all segments, over all views. Segments
 /// with an end behind a camera and samples beyond an image are left out of the mean.

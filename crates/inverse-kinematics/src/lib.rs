@@ -1,4 +1,5 @@
-//! Inverse kinematics whose freedom is used by images (method §3; Jaume-i-Capó et al. 2010).
+//! Inverse kinematics whose freedom is used by images (Jaume-i-Capó et al. 2010;
+//! docs/papers.md#image-constrained-inverse-kinematics).
 //!
 //! A chain has more joints than its end effectors need. `Δθ = J⁺Δx + α (I − J⁺J) ∇h` moves the end effectors to where they
 //! were measured, and what that leaves free is moved so that the chain's segments, seen by the cameras, lie inside the

@@ -20,7 +20,8 @@ impl Default for SupportWidth {
     }
 }
 
-/// The image support I_c of method §3.3: signed distance to the outline of a silhouette, scaled to [−1, 1].
+/// The image support I_c (docs/papers.md#image-constrained-inverse-kinematics, eq. 5, changed): signed distance to
+/// the outline of a silhouette, scaled to [−1, 1].
 ///
 /// At distance d inside it is `s (2 − s)` with s = d / inside, at most 1: it rises at the outline and levels out in the
 /// middle of a limb. Outside it is −d / outside, at least −1: a slope back into the body. What lies beyond the image has no

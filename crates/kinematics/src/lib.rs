@@ -2,7 +2,7 @@
 //!
 //! A pose of a file (Euler angles, [`model::Motion`]) is turned into *coordinates* of the same length, in which
 //! every number moves smoothly and nothing jumps by 2π: see [`Parametrisation`]. The derivative of every point
-//! comes from the world axis and pivot of each coordinate; no finite differences (method §1).
+//! comes from the world axis and pivot of each coordinate; no finite differences (docs/papers.md#notation).
 //!
 //! ```
 //! use kinematics::{Kinematics, Parametrisation};

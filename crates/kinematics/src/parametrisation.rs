@@ -44,11 +44,12 @@ impl References {
 
 /// The meaning of the D coordinates that stand for a pose.
 ///
-/// *Channels* are the file's own numbers. *Smooth* coordinates have the same length, but a free root is
-/// `x y z heading tilt_x tilt_z` with heading taken out as the leftmost rotation about y (method §2, mends 1 and 2:
-/// Acclaim's order is singular at headings of ±90°), and every joint with three rotations has a rotation vector
-/// about a reference rotation, which has no gimbal pole. Joints with one or two rotations keep their angles. Angles
-/// lie within half a turn of their reference (recorded thumbs run on for several turns); only the heading runs on.
+/// *Channels* are the file's own numbers. *Smooth* coordinates have the same length, but a free root is `x y z
+/// heading tilt_x tilt_z` with heading taken out as the leftmost rotation about y (docs/papers.md#heading-frame,
+/// docs/papers.md#smooth-angles: Acclaim's order is singular at headings of ±90°), and every joint with three
+/// rotations has a rotation vector about a reference rotation, which has no gimbal pole. Joints with one or two
+/// rotations keep their angles. Angles lie within half a turn of their reference (recorded thumbs run on for several
+/// turns); only the heading runs on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parametrisation {
     pub(crate) joints: Vec<JointRotation>,

@@ -11,7 +11,7 @@ use crate::{ClipInfo, HeadingFrame, MotionDatabase, SkeletonSize, WindowIndex};
 /// unlike that skeleton each clip's is.
 ///
 /// Recordings differ in their zero pose from one performer and calibration to the next by more than windows of motion
-/// differ (method §2). A performer's skeleton tells which clips are their own.
+/// differ (docs/papers.md#zero-poses). A performer's skeleton tells which clips are their own.
 #[derive(Debug, Clone)]
 pub struct ControlTable {
     points: usize,

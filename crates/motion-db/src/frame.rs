@@ -1,7 +1,7 @@
 use kinematics::HEADING;
 use nalgebra::Vector3;
 
-/// The frame that stands on the floor under a root and looks where it looks: method §2, mend 1.
+/// The frame that stands on the floor under a root and looks where it looks (docs/papers.md#heading-frame).
 ///
 /// `world_from_local`: turn by `heading` about y, then shift by (x, 0, z). Heights are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]

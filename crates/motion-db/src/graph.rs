@@ -14,8 +14,8 @@ const NEAR_LISTS: usize = 12;
 const CHOICE: usize = 6 * DEGREE;
 const SEGMENTS_A_PIECE: usize = 256;
 
-/// The neighbour graph of Chai & Hodgins 2005, of segments instead of poses: 16 neighbours of each segment,
-/// shape `[segments, 16]`.
+/// The neighbour graph of Chai & Hodgins 2005 (docs/papers.md#local-principal-components), of segments instead of
+/// poses: 16 neighbours of each segment, shape `[segments, 16]`.
 ///
 /// Neighbours are sought among the segments of near lists. Those come first that are nearer to the segment than to any
 /// neighbour before them, so that they lie in different directions; recordings that were played at other speeds are

@@ -1,5 +1,6 @@
-//! The motion database: recorded motion at 60 frames a second, in coordinates that know neither where on the
-//! floor the person stands nor which way they face, and search in it (method §2, mends 1, 2, 7 and 8).
+//! The motion database: recorded motion at 60 frames a second, in coordinates that know neither where on the floor
+//! the person stands nor which way they face, and search in it (docs/papers.md#heading-frame,
+//! docs/papers.md#neighbour-search).
 //!
 //! - [`MotionDatabase`]: clips and their coordinates; [`Augment`] makes more of them.
 //! - [`WindowIndex`]: every window `Q_{t,m}` of a database, rotated to principal axes, with its nearest neighbours: all of

@@ -1,6 +1,6 @@
 //! What sets performers apart: recordings of two people, or of one person on two days, differ in the zero pose of their
 //! joints by constant angles. They are larger than the differences between one walk and the next, and most of the error of
-//! a performer whose motion is not in the database (method §2).
+//! a performer whose motion is not in the database (docs/papers.md#zero-poses).
 
 use faer::Mat;
 use faer::linalg::solvers::{Llt, Solve};

@@ -17,7 +17,7 @@ const SEGMENTS_A_PIECE: usize = 512;
 /// All segments of an index, in the order of their lists.
 ///
 /// Motion is smooth: up to 8 windows in a row lie within a small ball about their mean. A query is compared with the
-/// balls' centres, quantised to 16 bits: their leading 32 principal features (method §2, mend 7), and all others
+/// balls' centres, quantised to 16 bits: their leading 32 principal features (docs/papers.md#neighbour-search), and all others
 /// where these are not enough.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Segments {

@@ -118,7 +118,7 @@ impl Observation {
     }
 }
 
-/// Finds the database poses from which the session may have started (method §2, mend 8): those whose control points
+/// Finds the database poses from which the session may have started (docs/papers.md#start-poses): those whose control points
 /// over the frames `offsets` fit the observed ones best, after the best turn about y and shift on the floor.
 ///
 /// `observed`: world positions (metres), shape `[offsets, points]`, `None` where not measured; `history`: number of

@@ -34,7 +34,8 @@ impl FeatureScale {
     }
 
     /// The features of the window `Q_{t,m}`: for i = 1 … m the pose of frame t − i relative to the heading frame of
-    /// frame t − 1 (method §2, mend 1). `poses[i − 1]` is `q_{t−i}` in world coordinates; `out` has shape `[m · dofs]`.
+    /// frame t − 1 (docs/papers.md#heading-frame). `poses[i − 1]` is `q_{t−i}` in world coordinates; `out` has shape
+    /// `[m · dofs]`.
     pub fn window_features(&self, poses: &[&[f64]], out: &mut [f64]) {
         let frame = HeadingFrame::from_coordinates(poses[0]);
         for (pose, out) in poses.iter().zip(out.chunks_exact_mut(self.per_dof.len())) {

@@ -1,4 +1,5 @@
-//! The most probable pose: energy terms, one a file, and the solver that minimises their sum (method §2).
+//! The most probable pose: energy terms, one a file, and the solver that minimises their sum
+//! (docs/papers.md#local-regression, eq. 1 and 2).
 //!
 //! ```text
 //! E(x) = Σ_p ‖f_p(x) − c_p‖²/σ_p²  +  (x − μ)ᵀ Σ⁻¹ (x − μ)
@@ -6,8 +7,8 @@
 //!
 //! - [`ControlPoints`]: the likelihood, where points were measured.
 //! - [`GaussianPrior`]: the prior over coordinates, with a full or a diagonal covariance.
-//! - [`MapSolver`]: Levenberg–Marquardt in the space of the measurements: a step is a solve of size 3P ≤ 18
-//!   (Woodbury, method §2, mend 5), and the inverse of Σ is never taken.
+//! - [`MapSolver`]: Levenberg–Marquardt in the space of the measurements: a step is a solve of size 3P, at most 48
+//!   (Woodbury, docs/papers.md#dual-form), and the inverse of Σ is never taken.
 
 mod control_points;
 mod linearisation;

@@ -1,11 +1,14 @@
-//! Predicting the next pose from the K nearest windows of motion (method §2).
+//! Predicting the next pose from the K nearest windows of motion (docs/papers.md#local-regression).
 //!
 //! A [`Predictor`] sees [`Examples`] (inputs: windows and control points; targets: the poses that followed) and a
 //! query, and gives a Gaussian over the next pose: a mean and the factor of a covariance.
 //!
-//! - [`LocalRegression`]: weighted ridge regression in its dual form, leave-one-out residuals (LR eq. 4–10, mended).
-//! - [`LocalPca`]: principal components of the successors, and smoothness (Chai & Hodgins).
-//! - [`PrincipalRegression`]: least squares on the principal components of the inputs (Liu et al.).
+//! - [`LocalRegression`]: weighted ridge regression in its dual form, leave-one-out residuals
+//!   (docs/papers.md#local-regression, eq. 4–10, changed).
+//! - [`LocalPca`]: principal components of the successors, and smoothness (Chai & Hodgins;
+//!   docs/papers.md#local-principal-components).
+//! - [`PrincipalRegression`]: least squares on the principal components of the inputs
+//!   (Liu et al.; docs/papers.md#principal-component-regression).
 //! - [`gplvm`]: a global latent variable model, trained offline.
 //! - [`NearestExample`]: the successor of the nearest window; the plain baseline.
 //!

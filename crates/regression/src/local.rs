@@ -6,20 +6,21 @@ use crate::{Examples, Parameters, Prediction, Predictor, Query};
 /// Least square of a pivot: one lost to rounding is held there.
 const LEAST_PIVOT: f64 = 1e-12;
 
-/// Local regression in its dual form (LR eq. 4–10 with the mends of method §2).
+/// Local regression in its dual form (docs/papers.md#local-regression, eq. 4–10, changed as said there).
 ///
-/// One factorisation of the K×K Gram matrix serves all D targets (mend 5). As LR prints it, the projected
+/// One factorisation of the K×K Gram matrix serves all D targets (docs/papers.md#dual-form). The projected
 /// regression of eq. 5–9 has rank one and collapses to weighted least squares, which needs a ridge because K is
-/// smaller than the window (mend 4); so that is what is computed: with centred inputs `X̃ = √ω (x − x̄)` and
+/// smaller than the window (docs/papers.md#ridge); so that is what is computed: with centred inputs `X̃ = √ω (x − x̄)` and
 /// targets `Ỹ = √ω (y − ȳ)`,
 ///
 /// ```text
 /// G = X̃ X̃ᵀ + λ I,   ŷ = ȳ + (x_q − x̄)ᵀ X̃ᵀ G⁻¹ Ỹ,   e_k = (G⁻¹ Ỹ)_k / (G⁻¹)_kk
 /// ```
 ///
-/// where `e_k` is the leave-one-out residual of example k times √ω_k (mend 6). X̃ itself is never made: G follows from the
-/// inner products of the x as they are. With `UᵀU = G`, one elimination of `[G | Ỹ | X̃ (x_q − x̄) | I]` leaves
-/// `[U | U⁻ᵀỸ | U⁻ᵀX̃ (x_q − x̄) | U⁻ᵀ]`, of which prediction and residuals are products.
+/// where `e_k` is the leave-one-out residual of example k times √ω_k (docs/papers.md#residual-covariance). X̃ itself
+/// is never made: G follows from the inner products of the x as they are. With `UᵀU = G`, one elimination of `[G | Ỹ
+/// | X̃ (x_q − x̄) | I]` leaves `[U | U⁻ᵀỸ | U⁻ᵀX̃ (x_q − x̄) | U⁻ᵀ]`, of which prediction and residuals are
+/// products.
 #[derive(Debug, Clone)]
 pub struct LocalRegression {
     /// `[G | Ỹ | X̃ (x_q − x̄) | I]`, row-major

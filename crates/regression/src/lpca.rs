@@ -17,8 +17,8 @@ impl Default for LpcaParameters {
     }
 }
 
-/// Local principal components (Chai & Hodgins 2005): the pose lies near the space of the leading principal components
-/// of the neighbours' successors, and keeps its velocity.
+/// Local principal components (Chai & Hodgins 2005; docs/papers.md#local-principal-components): the pose lies near
+/// the space of the leading principal components of the neighbours' successors, and keeps its velocity.
 ///
 /// ```text
 /// q = q̄ + B b + ε,    E(q) = bᵀΛ⁻¹b + ‖ε‖²/σ² + ‖q − 2 q_{t−1} + q_{t−2}‖²/τ²

@@ -19,8 +19,9 @@ impl Default for LpcrParameters {
     }
 }
 
-/// Local principal component regression (Liu et al. 2011, 2014): the neighbours' inputs are replaced by their scores on
-/// the leading principal components, and every target is regressed on those by weighted least squares.
+/// Local principal component regression (Liu et al. 2011, 2014; docs/papers.md#principal-component-regression): the
+/// neighbours' inputs are replaced by their scores on the leading principal components, and every target is regressed
+/// on those by weighted least squares.
 ///
 /// ```text
 /// √ω (x − x̄) = Σ_i √λ_i u_i b_iᵀ,    ŷ = ȳ + Σ_{i ≤ n} b_iᵀ(x_q − x̄) λ_i^−½ Ỹᵀu_i,

@@ -62,7 +62,7 @@ pub struct Parameters {
     /// the kernel's h² relative to the median squared distance of the neighbours
     pub bandwidth: f64,
     /// least standard deviation of a target, feature units: 1°. A DOF on which the neighbours agree is not
-    /// infinitely sure (method §2, mend 6)
+    /// infinitely sure (docs/papers.md#residual-covariance)
     pub min_sigma: f64,
 }
 
@@ -121,7 +121,7 @@ pub trait Predictor {
     }
 }
 
-/// Gaussian kernel weights `ω_k ∝ exp(−½ d_k²/h²)` with h² = `bandwidth` times the median of d² (method §2, mend 3),
+/// Gaussian kernel weights `ω_k ∝ exp(−½ d_k²/h²)` with h² = `bandwidth` times the median of d² (docs/papers.md#example-weights),
 /// shape `[K]`, sum 1. With all distances 0 they are equal.
 pub fn kernel_weights(distances_squared: &[f64], bandwidth: f64, out: &mut [f64]) {
     let count = distances_squared.len();

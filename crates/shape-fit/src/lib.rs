@@ -1,10 +1,11 @@
-//! Pose and shape of a person from the calibrated silhouettes of several cameras (method §4; MM §3), without any start
-//! given.
+//! Pose and shape of a person from the calibrated silhouettes of several cameras (docs/papers.md#morphable-model),
+//! without any start given.
 //!
-//! [`fit`] cleans the silhouettes, carves a coarse visual hull that tells where the person is and whether the views fit
-//! together, tries many start poses at low resolution, and minimises the distance between the rim of the projected model
-//! and the contours of the images, both ways, over pose and shape together. [`fit_frames`] does so for several frames of
-//! one person, who has one shape and a pose a frame; [`fit_pose`] finds the pose of a person whose shape is known. The method and what it was measured to do are in `docs/shape.md`.
+//! [`fit`] cleans the silhouettes, carves a coarse visual hull that tells where the person is and whether the views
+//! fit together, tries many start poses at low resolution, and minimises the distance between the rim of the
+//! projected model and the contours of the images, both ways, over pose and shape together. [`fit_frames`] does so
+//! for several frames of one person, who has one shape and a pose a frame; [`fit_pose`] finds the pose of a person
+//! whose shape is known. The method and what it was measured to do are in `docs/shape.md`.
 //!
 //! Metres, radians, y up. The person should stand about upright.
 

@@ -21,8 +21,8 @@ pub fn add_pose(model: &BodyModel, pose: &[f64], mut add: impl FnMut(usize, f64,
     energy + add_limits(model, pose, add)
 }
 
-/// Adds the energy of what is beyond the limits of joints, as one signed excess a limit (MM eq. 14), `Σ (excess / 3°)²`; its
-/// halved derivatives as `add(dof, weight, slope)`.
+/// Adds the energy of what is beyond the limits of joints, as one signed excess a limit
+/// (docs/papers.md#particle-search, eq. 14), `Σ (excess / 3°)²`; its halved derivatives as `add(dof, weight, slope)`.
 pub fn add_limits(model: &BodyModel, pose: &[f64], mut add: impl FnMut(usize, f64, f64)) -> f64 {
     let mut energy = 0.0;
     for (d, dof) in model.rig().dofs().iter().enumerate().skip(ROOT_DOFS) {

@@ -1,4 +1,4 @@
-//! Sparse reconstruction: full-body motion from the trajectories of a few control points (method §2).
+//! Sparse reconstruction: full-body motion from the trajectories of a few control points (docs/papers.md#local-regression).
 //!
 //! Frame by frame: the K database windows nearest to the last poses and the measured points
 //! ([`motion_db::WindowIndex`]), a regression from window to next pose ([`regression`]), and the most probable pose

@@ -27,7 +27,7 @@ struct Probe {
     surprise: f64,
 }
 
-/// The best of several beginnings at `frame` (method §2, mend 8): database poses whose control points fit the
+/// The best of several beginnings at `frame` (docs/papers.md#start-poses): database poses whose control points fit the
 /// coming frames, each run over these frames, and `current` among them if there is one. The one that makes the
 /// measurements most probable wins. If fewer than two points are measured at `frame`, it begins at the first frame in which
 /// two are.

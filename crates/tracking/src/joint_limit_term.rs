@@ -1,7 +1,7 @@
 use body::BodyModel;
 
-/// The first part of E_P: joints beyond their limits (MM eq. 14), `Σ (excess / 3°)²` with one signed excess for each limit, as
-/// `shape_fit` has it.
+/// The first part of E_P: joints beyond their limits (docs/papers.md#particle-search, eq. 14), `Σ (excess / 3°)²`
+/// with one signed excess for each limit, as `shape_fit` has it.
 pub fn joint_limit_energy(model: &BodyModel, pose: &[f64]) -> f64 {
     shape_fit::add_limits(model, pose, |_, _, _| {})
 }

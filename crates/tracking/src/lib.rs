@@ -1,5 +1,5 @@
-//! A person's pose followed through the calibrated silhouettes of several cameras (method §5; MM §4), the shape being known, and
-//! through points of the skin that cameras find again ([`ObservedFrame::with_matches`]).
+//! A person's pose followed through the calibrated silhouettes of several cameras (docs/papers.md#tracking), the
+//! shape being known, and through points of the skin that cameras find again ([`ObservedFrame::with_matches`]).
 //!
 //! [`Tracker`] takes frame after frame: the pose is predicted, fitted to the contours ([`Tracker::refine`]), judged limb by
 //! limb ([`Misalignment`]), and searched for by particles where limbs are misaligned ([`Tracker::search`]), then fitted again.

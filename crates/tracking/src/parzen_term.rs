@@ -2,8 +2,9 @@ use body::{BodyModel, ROOT_DOFS};
 
 use crate::{Error, Result};
 
-/// The second part of E_P: −log of a Parzen density of training poses (MM eq. 15–16). The kernel is a Gaussian of the squared
-/// distance over all angles; its width is the largest distance from a training pose to its nearest neighbour.
+/// The second part of E_P: −log of a Parzen density of training poses (docs/papers.md#particle-search, eq. 15 and
+/// 16). The kernel is a Gaussian of the squared distance over all angles; its width is the largest distance from a
+/// training pose to its nearest neighbour.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parzen {
     /// angles of the poses, radians, shape `[poses, angles]`

@@ -3,7 +3,7 @@ use nalgebra::DMatrix;
 
 use crate::{Error, Result};
 
-/// Directions in which poses of people differ most: the space in which E_R measures (MM eq. 12).
+/// Directions in which poses of people differ most: the space in which E_R measures (docs/papers.md#particle-search, eq. 12).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseSpace {
     /// unit vectors of angles, the widest first, shape `[dimensions, angles]`

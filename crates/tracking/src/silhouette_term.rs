@@ -4,8 +4,8 @@ use vision::{Chamfer, Rasteriser, Topology};
 
 use crate::ObservedFrame;
 
-/// E_S: how far the drawn body's silhouettes are from the observed ones (MM eq. 11), both ways, the mean of all views. Keeps its
-/// buffers: once it has seen a frame's sizes, it takes no memory.
+/// E_S: how far the drawn body's silhouettes are from the observed ones (docs/papers.md#particle-search, eq. 11),
+/// both ways, the mean of all views. Keeps its buffers: once it has seen a frame's sizes, it takes no memory.
 #[derive(Debug, Default)]
 pub struct SilhouetteTerm {
     posed: Posed,

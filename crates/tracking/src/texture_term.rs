@@ -1,8 +1,8 @@
 //! The energy of points that were found again: how far each point of the skin is from the ray on which it is seen now.
 //!
-//! For a ray with Plücker coordinates (d, l), d of unit length and l = o × d, the residual of a point V of the posed body is
-//! `V × d − l`, whose length is the distance from the ray (method §5; MM §4). It has no part along d, so that two of its
-//! coordinates across d are all there is. Weights are those of Geman and McClure.
+//! For a ray with Plücker coordinates (d, l), d of unit length and l = o × d, the residual of a point V of the posed
+//! body is `V × d − l`, whose length is the distance from the ray (docs/papers.md#tracking, eq. 6). It has no part
+//! along d, so that two of its coordinates across d are all there is. Weights are those of Geman and McClure.
 
 use body::{BodyModel, Posed, Shape};
 use nalgebra::Vector3;

@@ -16,8 +16,7 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// The symmetric difference of Zhang, Miao, Chen and Wan, *Optimization and soft constraints for human shape and pose
-    /// estimation based on a 3D morphable model*, 2013, eq. 11, pixels of the view: both means together.
+    /// The symmetric difference (docs/papers.md#particle-search, eq. 11), pixels of the view: both means together.
     pub fn symmetric_px(&self) -> f64 {
         self.drawn_px + self.observed_px
     }
@@ -54,7 +53,7 @@ impl Observed {
     }
 }
 
-/// Compares silhouettes by distance, eq. 11 of the paper that [`Difference::symmetric_px`] names: distances are zero inside
+/// Compares silhouettes by distance (docs/papers.md#particle-search, eq. 11): distances are zero inside
 /// a silhouette, so only pixels in one of the two add to the sums. The buffers are kept between calls.
 #[derive(Debug, Clone, Default)]
 pub struct Chamfer {

@@ -165,7 +165,7 @@ pub struct LimbErrors {
 }
 
 impl LimbErrors {
-    /// Mean distance of the inner joints, millimetres (eq. 9 of the paper).
+    /// Mean distance of the inner joints, millimetres (docs/papers.md#image-constrained-inverse-kinematics, eq. 9).
     pub fn mean_mm(&self) -> f64 {
         self.inner_mm.iter().sum::<f64>() / self.inner_mm.len().max(1) as f64
     }

@@ -1,9 +1,10 @@
 //! How often a disturbed pose is found again: the protocol behind the paper's claim that 25 particles × 10 iterations with the
-//! prior do what 100 × 15 do without it (MM §5).
+//! prior do what 100 × 15 do without it (docs/papers.md#particle-search).
 //!
-//! A start is a body of its own shape in a true pose, seen by cameras, and that pose with limbs turned in every angle. All methods
-//! get the same starts. Local optimisation and searches are judged alone, as in the paper: one search over the DOFs of the
-//! turned limbs, nothing tried twice. [`Way::Marey`] is all that [`Tracker`] does in a frame.
+//! A start is a body of its own shape in a true pose, seen by cameras, and that pose with limbs turned in every
+//! angle. All methods get the same starts. Local optimisation and searches are judged alone, as in the paper: one
+//! search over the DOFs of the turned limbs, nothing tried twice. [`Way::Marey`] is all that [`Tracker`] does in a
+//! frame.
 
 mod start;
 
@@ -98,7 +99,8 @@ pub const WITH_PRIOR: &str = "25 x 10, prior";
 pub const LARGE_WITHOUT: &str = "100 x 15, no prior";
 
 impl<'a> Method<'a> {
-    /// What the paper compares and what stands beside it. `built_in` are other training poses, to see what recorded ones are worth.
+    /// What the paper compares and what stands beside it. `built_in` are other training poses, to see what recorded
+    /// ones are worth.
     pub fn all(training_poses: &'a [Vec<f64>], built_in: Option<&'a [Vec<f64>]>) -> Vec<Self> {
         let options = |particles, iterations, with_prior| ParticleOptions {
             particles,

@@ -7,8 +7,8 @@ use super::{
 };
 use crate::{Case, Row, summary::ALL};
 
-const PAPERS: &str = " The papers: local regression and its baselines as printed by Shen et al. 2014 (LR) and Liu et al. (LR-zh), \
-                      trial out, on their own choice of CMU trials; they do not say whether RMS or mean absolute.";
+const PAPERS: &str = " The papers: local regression and its baselines as printed by Mousas et al. (2014) and Liu et al. \
+                      (docs/papers.md), trial out, on their own choice of CMU trials; they do not say whether RMS or mean absolute.";
 
 /// A line for each measure of a group of rows, a column for each value on an axis.
 struct Grid<'a> {
@@ -57,12 +57,13 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// LR, table 1: methods by numbers of control points.
+/// Mousas et al., table 1: methods by numbers of control points.
 pub fn points(rows: &[Row], axes: &Axes, beside_papers: bool) -> Table {
     let grid = Grid::new(rows, axes, &[Axis::Points], Axis::Points);
     let mut columns = vec!["method".to_owned(), "error, degrees".to_owned()];
     columns.extend(grid.columns.iter().map(|c| format!("{} points", c.points)));
-    let title = if beside_papers { "Control points, beside LR table 1" } else { "Control points" };
+    let title =
+        if beside_papers { "Control points, beside table 1 of Mousas et al." } else { "Control points" };
     let papers = if beside_papers { PAPERS } else { "" };
     let mut table = Table::new(title, note(rows) + &axes.held(&[Axis::Points]) + papers, 2, columns);
     for group in grid.groups(false) {
@@ -78,13 +79,13 @@ pub fn points(rows: &[Row], axes: &Axes, beside_papers: bool) -> Table {
     table
 }
 
-/// LR-zh, table 1: windows.
+/// Liu et al., table 1: windows.
 pub fn windows(rows: &[Row], axes: &Axes, beside_papers: bool) -> Table {
     let free = [Axis::Window, Axis::Points];
     let grid = Grid::new(rows, axes, &free, Axis::Window);
     let mut columns = vec!["method".to_owned(), "points".to_owned(), "measure".to_owned()];
     columns.extend(grid.columns.iter().map(|c| format!("m = {}", c.window)));
-    let title = if beside_papers { "Window length, beside LR-zh table 1" } else { "Window length" };
+    let title = if beside_papers { "Window length, beside table 1 of Liu et al." } else { "Window length" };
     let papers = if beside_papers { PAPERS } else { "" };
     let mut table = Table::new(title, note(rows) + &axes.held(&free) + papers, 3, columns);
     for group in grid.groups(true) {
@@ -110,13 +111,17 @@ pub fn windows(rows: &[Row], axes: &Axes, beside_papers: bool) -> Table {
     table
 }
 
-/// LR, table 2, and LR-zh, table 2: sizes of the database.
+/// Table 2 of Mousas et al. and of Liu et al.: sizes of the database.
 pub fn databases(rows: &[Row], axes: &Axes, beside_papers: bool) -> Table {
     let free = [Axis::Database, Axis::Points];
     let grid = Grid::new(rows, axes, &free, Axis::Database);
     let mut columns = vec!["method".to_owned(), "points".to_owned(), "measure".to_owned()];
     columns.extend(grid.columns.iter().map(|c| format!("{} poses", c.database_poses)));
-    let title = if beside_papers { "Database size, beside table 2 of LR and LR-zh" } else { "Database size" };
+    let title = if beside_papers {
+        "Database size, beside table 2 of Mousas et al. and Liu et al."
+    } else {
+        "Database size"
+    };
     let mut text = note(rows) + &axes.held(&free);
     text +=
         " Databases are whole clips in an order mixed by their names; each holds all of the smaller ones.";

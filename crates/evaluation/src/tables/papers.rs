@@ -1,10 +1,10 @@
-//! What the papers print, to stand beside what we measure (method §2). They do not say whether their errors are RMS or mean
+//! What the papers print, to stand beside what we measure (docs/papers.md). They do not say whether their errors are RMS or mean
 //! absolute; their protocol is leave-one-out: *trial out*.
 
 /// Methods in the order of the papers' tables.
 pub const METHODS: [&str; 4] = ["gplvm", "lpca", "lpcr", "local-regression"];
 
-/// LR, table 1: errors (degrees) of each of [`METHODS`] for 2 to 6 control points.
+/// Mousas et al. (docs/papers.md#local-regression), table 1: errors (degrees) of each of [`METHODS`] for 2 to 6 control points.
 pub const POINTS: [[f64; 5]; 4] = [
     [56.76, 41.88, 16.13, 9.45, 5.92],
     [43.27, 29.25, 10.56, 6.39, 3.81],
@@ -12,27 +12,28 @@ pub const POINTS: [[f64; 5]; 4] = [
     [18.63, 7.86, 2.67, 2.25, 1.90],
 ];
 
-/// LR, table 2, and LR-zh, table 2: the databases and the errors (degrees) of each of [`METHODS`] with 6 control points.
+/// Table 2 of Mousas et al. and of Liu et al.: the databases and the errors (degrees) of each of [`METHODS`] with 6
+/// control points.
 pub const DATABASES: [(&str, [f64; 4]); 4] = [
-    ("LR 69,888", [5.86, 3.92, 3.38, 2.01]),
-    ("LR 1.1 M", [26.57, 3.02, 2.75, 1.56]),
-    ("LR-zh 56,731", [5.81, 3.91, 3.29, 2.03]),
-    ("LR-zh 1.2 M", [25.98, 3.04, 2.81, 1.62]),
+    ("Mousas 69,888", [5.86, 3.92, 3.38, 2.01]),
+    ("Mousas 1.1 M", [26.57, 3.02, 2.75, 1.56]),
+    ("Liu 56,731", [5.81, 3.91, 3.29, 2.03]),
+    ("Liu 1.2 M", [25.98, 3.04, 2.81, 1.62]),
 ];
 
-/// LR-zh, table 1: errors (degrees) of local regression for windows of 1 to 4 frames.
+/// Liu et al. (docs/papers.md#sparse-constraints), table 1: errors (degrees) of local regression for windows of 1 to 4 frames.
 pub const WINDOWS: [f64; 4] = [2.96, 2.04, 1.89, 1.68];
 
-/// LR-zh, table 1: frames a second for windows of 1 to 4 frames, one core of 2.8 GHz.
+/// Liu et al., table 1: frames a second for windows of 1 to 4 frames, one core of 2.8 GHz.
 pub const FRAMES_PER_SECOND: [f64; 4] = [84.0, 59.0, 34.0, 20.0];
 
-/// LR's error (degrees) of a method for a number of control points.
+/// The error of Mousas et al. (degrees) of a method for a number of control points.
 pub fn for_points(method: &str, points: usize) -> Option<f64> {
     let row = METHODS.iter().position(|m| *m == method)?;
     POINTS[row].get(points.checked_sub(2)?).copied()
 }
 
-/// LR-zh's error (degrees) and frames a second of local regression for a window.
+/// The error of Liu et al. (degrees) and frames a second of local regression for a window.
 pub fn for_window(method: &str, window: usize) -> Option<(f64, f64)> {
     let i = window.checked_sub(1).filter(|&i| i < WINDOWS.len() && method == METHODS[3])?;
     Some((WINDOWS[i], FRAMES_PER_SECOND[i]))

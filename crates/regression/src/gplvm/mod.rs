@@ -1,5 +1,5 @@
-//! The Scaled Gaussian Process Latent Variable Model of Grochow et al. (2004): one global model of poses, learned
-//! offline, one for a database.
+//! The Scaled Gaussian Process Latent Variable Model of Grochow et al. (2004; docs/papers.md#latent-variable-model):
+//! one global model of poses, learned offline, one for a database.
 //!
 //! A pose and its velocity are features `y` of a point `x` in a space of 2 to 5 latent dimensions. Each feature is a
 //! Gaussian process over the latent space, with its own scale `w_k`, seen at an *active set* of a few hundred poses:

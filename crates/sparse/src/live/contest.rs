@@ -37,10 +37,11 @@ pub(super) enum Phase {
 
 /// Finds out, without stopping, where the performer is.
 ///
-/// The database is searched in slices for poses that fit the last frames; the best three then run beside the leader for a
-/// heat, and who made the measurements most probable leads on (evidence as in [`crate::Reconstructor::reconstruct`], method §2,
-/// mend 8). Heats go on until as many frames as a start looks at were seen and the `start_candidates` best poses for
-/// these have run. The first search has one frame to go by; its best pose leads until there is a better one.
+/// The database is searched in slices for poses that fit the last frames; the best three then run beside the leader
+/// for a heat, and who made the measurements most probable leads on (evidence as in
+/// [`crate::Reconstructor::reconstruct`], docs/papers.md#start-poses). Heats go on until as many frames as a start
+/// looks at were seen and the `start_candidates` best poses for these have run. The first search has one frame to go
+/// by; its best pose leads until there is a better one.
 #[derive(Debug, Clone)]
 pub(super) struct Contest {
     scan: StartScan,

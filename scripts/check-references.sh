@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# References that code and documents make must lead somewhere: every docs/NAME.md and every docs/NAME.md#section that is named
+# exists, and nothing refers to documents or numberings that are not in the repository. With --self-test it first shows
+# that it finds what it looks for.
+set -euo pipefail
+shopt -s inherit_errexit
+cd "$(dirname "$0")/.."
+
+# Short names of papers and sections of notes that only their authors have; docs/papers.md is what may be named.
+dangling='method(\.md)? §|design(\.md)? §|\bmends? [0-9]|\bMM (eq\.|§)|\bIK eq\.|\bIBIK\b|\bLR(-zh)?,? (eq\.|table|[0-9])|\bLR-zh\b'
+
+# Prints the anchors of the headings of a Markdown file.
+anchors() {
+    sed -nE 's/^#+ +//p' "$1" | tr '[:upper:]' '[:lower:]' | sed -E 's/[^[:alnum:] _-]//g; s/ /-/g'
+}
+
+# Prints `FILE:LINE:REFERENCE` of each reference of the files given that leads nowhere.
+broken() {
+    local file line reference page section
+    {
+        grep -nHoE '\bdocs/[a-z-]+\.md(#[a-z0-9-]+)?' "$@" || true
+        # links between documents name their neighbours without the folder
+        grep -nHoE '\]\(([a-z-]+\.md)?#[a-z0-9-]+\)' "$@" | grep -E '(^|/)docs/[a-z-]+\.md:' |
+            sed -E 's|^(.*docs/)([a-z-]+\.md)(:[0-9]+:)\]\(#(.*)\)$|\1\2\3docs/\2#\4|; s|\]\((.*)\)$|docs/\1|' || true
+    } | while IFS=: read -r file line reference; do
+        page=${reference%%#*} section=${reference#"$page"}
+        if [[ ! -f $page ]]; then
+            echo "$file:$line: $page does not exist"
+        elif [[ -n $section ]] && ! anchors "$page" | grep -qxF -- "${section#\#}"; then
+            echo "$file:$line: $page has no section $section"
+        fi
+    done
+}
+
+# Prints each line of the files given that refers to what is not in the repository.
+without_document() {
+    grep -nHE "$dangling" "$@" | sed 's/$/   <- refers to no document of the repository; see docs\/papers.md/' || true
+}
+
+self_test() {
+    local dir line
+    dir=$(mktemp -d)
+    # shellcheck disable=SC2064 # the folder of this call
+    trap "rm -rf '$dir'" EXIT
+    while IFS= read -r line; do
+        printf '%s\n' "$line" >"$dir/lib.rs"
+        [[ -n $(broken "$dir/lib.rs")$(without_document "$dir/lib.rs") ]] ||
+            { echo "references self-test: did not find: $line" >&2; exit 1; }
+    done <<'WRONG'
+/// see docs/no-such-page.md
+/// (docs/papers.md#no-such-section, eq. 3)
+/// The frame of the root: method §2, mend 1.
+/// A Parzen density (MM eq. 15)
+/// (LR eq. 4-10)
+/// LR-zh, table 1
+WRONG
+    printf '/// (docs/papers.md#local-regression, eq. 10; docs/papers.md)\n' >"$dir/lib.rs"
+    [[ -z $(broken "$dir/lib.rs")$(without_document "$dir/lib.rs") ]] ||
+        { echo "references self-test: found something in a right reference" >&2; exit 1; }
+}
+
+[[ ${1:-} == --self-test ]] && self_test
+
+mapfile -t files < <(git ls-files '*.rs' '*.md' '*.proto' '*.sql' '*.toml' '*.sh' ':!scripts/check-references.sh')
+found=$(broken "${files[@]}"; without_document "${files[@]}")
+if [[ -n $found ]]; then
+    printf '%s\n' "$found" >&2
+    exit 1
+fi
+echo "references: all lead somewhere"
