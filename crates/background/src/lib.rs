@@ -3,7 +3,7 @@
 //! - [`BackgroundModel`]: a plate or the clip's own colours, compared by brightness and colour (Horprasert, Harwood and
 //!   Davis 1999), or a mixture of Gaussians (Stauffer and Grimson 1999, Zivkovic 2004).
 //! - [`Cleaner`]: morphology on packed bits, holes, and which region is the person.
-//! - [`FrameQuality`], [`CameraQuality`], [`Advice`]: what can be told without the truth, and what to do about it.
+//! - [`FrameQuality`], [`CameraQuality`], [`Advice`]: what can be judged without ground truth, and what to do about it.
 //! - [`Segmenter`]: all of it, frame after frame.
 //!
 //! ```

@@ -76,7 +76,7 @@ pub struct CleaningParameters {
     pub smallest_piece: f64,
     /// a region is the person of the frame before if it shares at least this much of that one's area
     pub continuity: f64,
-    /// silhouettes smaller than this share of the picture are no person
+    /// silhouettes smaller than this share of the picture are not a person
     pub smallest_person: f64,
 }
 

@@ -1,4 +1,4 @@
-//! How far a silhouette can be trusted, and what to do about it, told from the pictures alone: nobody knows the truth.
+//! How far a silhouette can be trusted, and what to do about it, judged from the pictures alone, without ground truth.
 
 use std::fmt;
 

@@ -61,7 +61,7 @@ impl Segmenter {
     /// one. The sample may contain the person; without a plate it must not be in one place for half of them.
     ///
     /// # Errors
-    /// [`Error`] tells which parameter, frame or plate can't be.
+    /// [`Error`] names the parameter, frame or plate that is invalid.
     pub fn learn(parameters: &Parameters, plate: Option<&Image>, sample: &[Image]) -> Result<Self> {
         parameters.check()?;
         let (width, height) = size_of(sample)?;

@@ -26,7 +26,7 @@ pub struct Grey {
 }
 
 impl Grey {
-    /// Reads the region of the person; `false` if nobody is there. What lies outside picture or silhouette is no person.
+    /// Reads the region of the person; `false` if nobody is there. What lies outside picture or silhouette is not the person.
     pub fn read(&mut self, image: &Image, silhouette: &Silhouette) -> bool {
         let Some([left, top, right, bottom]) = silhouette.bounds() else { return false };
         let (right, bottom) = (right.min(image.width()), bottom.min(image.height()));

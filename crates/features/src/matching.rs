@@ -6,7 +6,7 @@ use crate::{Descriptor, Feature, Features, Options};
 const MOST_SCALE: f64 = 1.6;
 /// Descriptors farther apart are not the same, steps: unrelated ones are about 600 apart.
 const FARTHEST: u32 = 350;
-/// What lies nearer than this to the best is no other place, times the width of the feature.
+/// Matches nearer than this to the best, times the width of the feature, are the same place.
 const SAME_PLACE: f64 = 3.0;
 
 /// Pairs of features that look alike, as indices before and now, in the order of those now: each is the nearest to the other of
@@ -47,7 +47,7 @@ pub fn match_features(before: &Features, now: &Features, options: &Options) -> V
     nearest_before.into_iter().enumerate().filter_map(mutual).collect()
 }
 
-/// Stands for a pair that can't be.
+/// Stands for an impossible pair.
 const NOT_SEEN: u32 = u32::MAX;
 
 struct Search<'a> {

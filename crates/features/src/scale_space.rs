@@ -4,7 +4,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::grey::Grey;
 
-/// Extrema are looked for at so many scales an octave (Lowe's figure 3: three are best).
+/// Scales an octave at which extrema are looked for (Lowe's figure 3: three are best).
 pub const SCALES: usize = 3;
 /// Gaussians of an octave: differences above and below every scale are needed.
 pub const LAYERS: usize = SCALES + 3;
@@ -202,7 +202,7 @@ fn weigh<'a, S: Simd>(
         return;
     }
     for at in (0..width).step_by(chunk) {
-        // the last ones are summed twice where the width is no multiple
+        // the last ones are summed twice where the width is not a multiple
         let at = at.min(width - chunk);
         let (middle, _) = S::as_simd_f32s(&pair(0).0[at..at + chunk]);
         let weight = simd.splat_f32s(kernel[0]);

@@ -32,7 +32,7 @@ pub enum Error {
         place: Place,
         /// what is there
         found: String,
-        /// what may be there
+        /// what is valid there
         expected: String,
     },
     /// What the file says does not make a skeleton, a motion or trajectories.

@@ -1,6 +1,6 @@
 //! Frame rates from rounded times.
 
-/// Frames per second of a period in seconds that was printed with so many decimals: the whole number that is
+/// Frames per second of a period in seconds that was printed with `decimals` decimals: the whole number that is
 /// printed so if there is one (`0.008333` is 120 Hz), else the inverse.
 pub(crate) fn from_period(seconds: f64, decimals: usize) -> f64 {
     let rate = 1.0 / seconds;

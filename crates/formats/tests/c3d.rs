@@ -223,7 +223,7 @@ fn residuals_are_standard_deviations_where_they_can_be() {
     let made = Made::new(84, -0.5).bytes();
     let careless = PointsOptions { sigma_m: 0.006, ..PointsOptions::default() };
     assert!(!c3d::read(&made, &careless).unwrap().value.has_sigmas());
-    // a metre and a half is no residual
+    // a metre and a half is not a residual
     assert!(!Made::new(84, -150.0).read().value.has_sigmas());
 }
 

@@ -39,10 +39,10 @@ pub enum Error {
         name: &'static str,
         /// its value
         value: f64,
-        /// what would do
+        /// what is valid
         expected: &'static str,
     },
-    /// Coordinates that are no numbers.
+    /// Coordinates that are not finite.
     #[error("coordinate {dof} is {value}, expected a finite number")]
     NotFinite {
         /// index of the coordinate

@@ -96,7 +96,7 @@ impl Solver {
         &self.positions
     }
 
-    /// What the criterion says of the coordinates that the last solve found: H = h − ½ w |θ − posture|².
+    /// The criterion at the coordinates that the last solve found: H = h − ½ w |θ − posture|².
     pub fn criterion(&self, x: &[f64], evidence: &Evidence<'_>) -> f64 {
         let limits = self.chain.limits.iter();
         let off = limits

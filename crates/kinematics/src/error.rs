@@ -15,7 +15,7 @@ pub enum Error {
     UnknownPoint {
         /// the name asked for
         name: String,
-        /// names that would do
+        /// valid names
         known: String,
     },
     /// A pose of the wrong length.

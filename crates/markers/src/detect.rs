@@ -70,7 +70,7 @@ impl Fit<'_> {
 /// How well the names go with a map under a prefix.
 fn fit<'a>(map: &'a MarkerMap, names: &[String], prefix: &str) -> Fit<'a> {
     let file = FileNames::new(names, prefix);
-    // a name that may be several is no match
+    // an ambiguous name does not match
     let find = |name: &String| file.find(name).ok().flatten();
     let point = |point: &crate::Point| {
         let choices = point.choices.iter().map(|group| PointFit {

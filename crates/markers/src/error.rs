@@ -68,7 +68,7 @@ pub enum Error {
         /// presets and prefixes
         candidates: String,
     },
-    /// The combined trajectories contradict each other; a fault of this crate.
+    /// The combined trajectories contradict each other; a bug in this crate.
     #[error(transparent)]
     Model(#[from] model::Error),
 }

@@ -13,7 +13,7 @@ const MAX_POINTS: usize = 64;
 const MAX_CHOICES: usize = 8;
 const MAX_GROUP: usize = 32;
 const MAX_MARKERS: usize = 512;
-/// Deepest nesting of brackets, and most dots in a line: more is no map, and would take a reader's stack.
+/// Deepest nesting of brackets, and most dots in a line: more is not a map, and would overflow a reader's stack.
 const MAX_DEPTH: usize = 64;
 const MAX_DOTS: usize = 256;
 

@@ -1,4 +1,4 @@
-//! Maps and files that nobody means: a value or an error, never a panic.
+//! Nonsensical maps and files: a value or an error, never a panic.
 
 use markers::{MarkerMap, detect, fits, template};
 use model::PointTrajectories;

@@ -91,7 +91,7 @@ pub enum Error {
         /// the value found
         found: f64,
     },
-    /// A camera that can't be.
+    /// An invalid camera.
     #[error("camera {name}: {what}")]
     Camera {
         /// name of the camera
@@ -115,7 +115,7 @@ pub enum Error {
         /// vertices of the mesh
         vertices: usize,
     },
-    /// An image has not the pixels of its size.
+    /// An image whose number of pixels is not its size.
     #[error("found {found} pixels, expected {width} x {height}")]
     PixelCount {
         /// pixels found

@@ -22,7 +22,7 @@ impl Blocks {
         Self { dims, data }
     }
 
-    /// How many numbers the blocks of so many rows hold.
+    /// How many numbers the blocks of `rows` rows hold.
     pub fn numbers(rows: usize, dims: usize) -> usize {
         rows.div_ceil(LANES) * LANES * dims
     }

@@ -45,7 +45,7 @@ impl SkeletonSize {
     }
 }
 
-/// Nobody is recorded farther from the origin, metres; nor are angles larger, radians.
+/// No recording is farther from the origin, metres, and no angle is larger, radians.
 const FARTHEST: f64 = 1e4;
 
 impl MotionDatabase {

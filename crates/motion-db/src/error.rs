@@ -31,7 +31,7 @@ pub enum Error {
     /// Two parts of a database whose numbers mean different poses.
     #[error("the parts of a motion database have different coordinates, expected those of one build")]
     OtherCoordinates,
-    /// A skeleton whose left and right are no mirror images.
+    /// A skeleton whose left and right are not mirror images.
     #[error("joint {joint} cannot be mirrored: {reason}")]
     Mirror {
         /// the joint
@@ -99,7 +99,7 @@ pub enum Error {
         /// longest
         max: usize,
     },
-    /// A coordinate of a recording that nobody can have.
+    /// A coordinate that no person can have.
     #[error(
         "clip {clip}: coordinate {dof} of frame {frame} (60 a second) is {found}, expected at most 10000 metres or radians"
     )]

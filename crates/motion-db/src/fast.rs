@@ -27,7 +27,7 @@ const STRANGE_GLOBAL: Effort = Effort { lists: 256, segments: 1_000 };
 const STRANGE_TRACKING: Effort = Effort { lists: 128, segments: 700 };
 /// Neighbours for which that much is looked at; for more, in proportion more segments.
 const NEIGHBOURS: usize = 64;
-/// A query whose tail is so many times the energy of a segment's is like nothing in the database: the leading features
+/// A query whose tail has this many times the energy of a segment's resembles nothing in the database: the leading features
 /// do not tell what is near to it.
 const STRANGE_ENERGY: f32 = 1.5;
 /// Part of its radius by which a segment may be nearer than its centre. The window at its end rarely points to the query.

@@ -23,7 +23,7 @@ const MIN_AXIS_COSINE: f64 = 0.99;
 /// accepted and left in.
 ///
 /// # Errors
-/// [`Error::Mirror`] if the sides have other channels, hang from joints that are no pair, or have axes that are no
+/// [`Error::Mirror`] if the sides have other channels, hang from joints that are not a pair, or have axes that are not
 /// mirror images.
 pub fn mirror(motion: &Motion) -> Result<Motion> {
     let mirror = Mirror::new(motion.skeleton())?;

@@ -12,7 +12,7 @@ use crate::{FeatureScale, HeadingFrame, MotionDatabase};
 
 /// Skeletons that differ by less in every number are one performer's, metres.
 const SAME_SKELETON_M: f64 = 1e-3;
-/// From fewer performers it cannot be told what is a zero pose and what a way of moving: none is learned.
+/// With fewer performers a zero pose cannot be told from a way of moving: none is learned.
 const MIN_PERFORMERS: usize = 6;
 /// Poses of a performer that are compared with those of others, at most.
 const SAMPLES: usize = 100;
@@ -140,7 +140,7 @@ impl MotionDatabase {
         samples
     }
 
-    /// What the database says of the zero pose of the performer whose skeleton this is (same structure): what was learned
+    /// What the database tells about the zero pose of the performer whose skeleton this is (same structure): what was learned
     /// if their recordings are in it, otherwise that of performers with similar skeletons, and how performers differ.
     pub fn zero_pose_prior(&self, skeleton: &Skeleton) -> ZeroPosePrior {
         let dofs = self.num_dofs();

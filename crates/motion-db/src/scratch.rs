@@ -24,7 +24,7 @@ pub(crate) struct FastScratch {
 }
 
 impl FastScratch {
-    /// Before a search among so many segments.
+    /// Prepares a search among `segments` segments.
     pub fn start(&mut self, segments: usize) {
         if self.seen.len() < segments || self.age > u32::MAX - 4 {
             self.seen.clear();

@@ -8,7 +8,7 @@ use crate::lists::Lists;
 
 /// Most windows of a segment.
 const MAX_ROWS: usize = 8;
-/// A segment is at most so long, in steps of median length from one window to the next.
+/// Longest segment, in steps of median length from one window to the next.
 const MAX_STEPS: f32 = 8.0;
 /// Fewer segments than these are not worth a structure: all windows are looked at.
 const MIN_SEGMENTS: usize = 512;

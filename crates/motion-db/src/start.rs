@@ -49,7 +49,7 @@ struct Sums {
 }
 
 impl Observation {
-    /// Room for so many samples.
+    /// Room for this many samples.
     pub fn with_capacity(samples: usize) -> Self {
         Self { samples: Vec::with_capacity(samples), ..Self::default() }
     }
@@ -154,7 +154,7 @@ pub fn start_poses(
         let poses = (clip.first_pose + history..end).filter(|pose| !exclude.iter().any(|r| r.contains(pose)));
         all.extend(poses.map(|pose| (observation.misfit(table, pose) + unlike, pose)));
     }
-    // Each pose chosen rules out so many others at most: the rest need not be sorted.
+    // Each pose chosen rules out a limited number of others: the rest need not be sorted.
     let enough = count * (2 * DISTINCT_FRAMES + 1);
     let best_first = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
     if enough < all.len() {

@@ -13,7 +13,7 @@ const KEPT: usize = 32;
 /// The search of [`crate::start_poses`] in slices, for those who may not stop to search: it finds the poses that a
 /// person may be in *now*, given what was measured over the last frames.
 ///
-/// Takes no memory once made.
+/// Allocates nothing once made.
 #[derive(Debug, Clone)]
 pub struct StartScan {
     /// frames before the pose in its clip

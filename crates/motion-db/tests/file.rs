@@ -260,7 +260,7 @@ fn coordinates_that_are_no_numbers_are_refused() {
     assert!(message.contains("is not finite"), "{message}");
 }
 
-/// A sink that takes no more than so many bytes.
+/// A sink that takes a limited number of bytes.
 struct Full(usize);
 
 impl std::io::Write for Full {

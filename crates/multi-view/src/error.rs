@@ -43,13 +43,13 @@ pub enum Error {
         /// the range
         expected: &'static str,
     },
-    /// A parameter of the background model that can't be.
+    /// An invalid parameter of the background model.
     #[error("background: {0}")]
     Background(#[from] background::Error),
-    /// A clip of silhouettes that is damaged or cut off.
+    /// A clip of silhouettes that is damaged or truncated.
     #[error("not a clip of silhouettes: {0}")]
     Clip(String),
-    /// Matches of points that can't be, or a file of them that is damaged or cut off.
+    /// Invalid matches of points, or a file of them that is damaged or truncated.
     #[error("not a clip of point matches: {0}")]
     Matches(String),
     /// A frame that is not in a clip.

@@ -222,7 +222,7 @@ mod tests {
                 assert!(found.iter().all(|found| inside(found.before) && inside(found.now)));
             }
         }
-        // silhouettes are no matches
+        // silhouettes are not matches
         assert!(MatchClip::from_bytes(&crate::ClipWriter::new(3, 3, 0).finish()).is_err());
     }
 }

@@ -9,7 +9,7 @@ pub enum Error {
         name: &'static str,
         /// value found
         found: usize,
-        /// what would do
+        /// what is valid
         expected: &'static str,
     },
     /// A training set whose numbers do not fit together.
@@ -29,10 +29,10 @@ pub enum Error {
     TooFew {
         /// poses found
         found: usize,
-        /// fewest that do
+        /// fewest needed
         expected: usize,
     },
-    /// A number that is none.
+    /// A number that is not finite.
     #[error("number {index} of the training set is {found}, expected a finite number")]
     NotFinite {
         /// which
@@ -54,7 +54,7 @@ pub enum Error {
         /// steps planned
         total: usize,
     },
-    /// Bytes that are no trained model.
+    /// Bytes that are not a trained model.
     #[error("not a trained latent variable model: {found}")]
     Bytes {
         /// what was found

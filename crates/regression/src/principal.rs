@@ -44,7 +44,7 @@ impl Principal {
     }
 
     /// Finds the components of `rows`, row-major, shape `[count, width]`. There are none where all rows are zero or
-    /// one is no number.
+    /// one is not a number.
     pub fn decompose(&mut self, rows: &[f64], count: usize, width: usize) {
         let is_tall = count > width;
         let side = count.min(width);

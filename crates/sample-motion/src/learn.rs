@@ -18,7 +18,7 @@ const MOST_STYLES: usize = 12;
 const MOST_VARIATIONS: usize = 10;
 const GROUPS_PER_STYLE: usize = 3;
 const SEGMENTS_PER_VARIATION: usize = 4;
-/// Segments this many times farther from their group's mean than the median are no variation of it but something else.
+/// Segments this many times farther from their group's mean than the median are not variations of it.
 const OUTLYING: f64 = 2.5;
 /// Where trials hold one segment each, variation within a trial is taken to be this share of the one between them.
 const STYLE_AS_VARIATION: f64 = 0.4;

@@ -36,7 +36,7 @@ pub(crate) struct Movement {
     pub variation: Vec<Quantised>,
 }
 
-/// What the file's header says of a movement.
+/// A movement as the file's header describes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MovementShape {

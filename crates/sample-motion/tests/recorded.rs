@@ -18,7 +18,7 @@ fn recorded(folder: &Path, wanted: impl Fn(&str) -> bool) -> Vec<LabelledMotion>
     .collect()
 }
 
-/// Joint coordinates (radians, fingers and thumbs left out) of every so many-th frame: 12 a second.
+/// Joint coordinates (radians, fingers and thumbs left out) of every n-th frame: 12 a second.
 fn postures(motion: &Motion) -> Vec<Vec<f64>> {
     let skeleton = motion.skeleton();
     let smooth = Parametrisation::smooth(skeleton, &References::rest(skeleton)).unwrap();

@@ -3,7 +3,7 @@
 use background::{Components, Neighbours};
 use model::Silhouette;
 
-/// Smaller regions than this share of the largest are no people.
+/// Regions smaller than this share of the largest are not people.
 const LEAST_REGION: f64 = 0.04;
 /// Larger holes than this share of the person are real: between arm and body.
 const LARGEST_HOLE: f64 = 0.004;

@@ -35,7 +35,7 @@ pub enum Error {
         /// width and height of the camera's image
         expected: [usize; 2],
     },
-    /// A calibration that can't be.
+    /// An invalid calibration.
     #[error(transparent)]
     Camera(#[from] model::Error),
     /// A view doesn't agree with the others.
@@ -99,7 +99,7 @@ pub enum Error {
     /// The visual hull could not be carved for another reason.
     #[error(transparent)]
     Hull(vision::Error),
-    /// The model is of no use here.
+    /// The model cannot be used here.
     #[error("the body model has {found}, expected {expected}")]
     Model {
         /// what was found

@@ -11,7 +11,7 @@ const LEAST_VIEWS: usize = 2;
 const LEAST_ANGLE: f64 = 30.0;
 /// More of an outline than this on the image's border: the view is cut.
 const CUT: f64 = 0.02;
-/// From so many views on, the hull is what all but one see.
+/// From this number of views on, the hull is what all but one see.
 const TOLERANT: usize = 4;
 /// Heights of people, with an arm up or sitting low, metres.
 const HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.5..=2.8;
@@ -21,7 +21,7 @@ const ROUGH_HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.3..=4.0;
 const CELL_M: f64 = 0.03;
 /// Least share of each silhouette that the hull covers where calibration and silhouettes are right.
 const COVERED: f64 = 0.85;
-/// A mean share below this is no person that the views have in common.
+/// Below this mean share the views have no person in common.
 const LEAST_COVERED: f64 = 0.75;
 /// Volume of the second piece, as a share of the first, or area of the second region of a silhouette, above which there are
 /// two people.

@@ -1,4 +1,4 @@
-//! What can't be fitted is said in words that help.
+//! What cannot be fitted is explained to the user.
 
 use body::BodyModel;
 use model::{Camera, Mesh, Silhouette};

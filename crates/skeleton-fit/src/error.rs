@@ -22,7 +22,7 @@ pub enum Error {
     },
     /// Nothing to compare with.
     #[error(
-        "found no span of {frames} frames with at least two measured points, or no database clip of so many frames"
+        "found no span of {frames} frames with at least two measured points, or no database clip of that many frames"
     )]
     NothingToCompare {
         /// length of a span, frames

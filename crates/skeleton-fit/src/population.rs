@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{Limbs, Result};
 
-/// Standard deviation of the logarithm of a person's size that is taken for granted, whoever is in the database.
+/// Standard deviation of the logarithm of a person's size that is assumed whatever the database holds.
 const SIZE_SIGMA: f64 = 0.06;
 /// Standard deviation of the logarithm of one limb's size besides.
 const LIMB_SIGMA: f64 = 0.03;

@@ -9,7 +9,7 @@ pub enum Error {
         name: &'static str,
         /// value found
         found: String,
-        /// what would do
+        /// what is valid
         expected: &'static str,
     },
     /// A control point without a trajectory.
@@ -89,12 +89,12 @@ pub enum Error {
         /// what was found
         found: String,
     },
-    /// A live state that cannot be gone on with.
+    /// A live state that cannot be resumed.
     #[error("live state is {found}, expected {expected}")]
     LiveState {
         /// what was found
         found: String,
-        /// what would do
+        /// what is valid
         expected: String,
     },
     /// Method gplvm without a model.

@@ -1,4 +1,4 @@
-/// What a frame is made of, for whoever takes the time: see [`crate::Reconstructor::watched`].
+/// The parts of a frame, for callers that time them: see [`crate::Reconstructor::watched`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FramePart {
     /// the search for a pose to start from; frames follow on which the candidates are compared

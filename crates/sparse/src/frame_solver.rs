@@ -178,7 +178,7 @@ impl<'a> FrameSolver<'a> {
         angles.iter().sum::<f64>() / angles.len().max(1) as f64
     }
 
-    /// Adds what the last frame says of the performer's zero pose, beside what is assumed of it, counted `share` times.
+    /// Adds what the last frame tells about the performer's zero pose, beyond what is assumed of it, weighted by `share`.
     pub fn add_zero_pose_information(&mut self, share: f64, information: &mut ZeroPoseInformation) {
         let dofs = self.prior.mean.len();
         let controls = (!self.query.control_factors.is_empty()

@@ -39,7 +39,7 @@ pub struct LivePose<'a> {
 ///
 /// What [`Reconstructor::reconstruct`] does with frames that lie before it, this does with frames that come: each is
 /// computed when it comes, from what came before. A frame costs about the same whenever it comes: starts and re-entries
-/// after loss are spread over the frames, see [`Contest`]. Takes no memory once made.
+/// after loss are spread over the frames, see [`Contest`]. Allocates nothing once made.
 pub struct Live<'a> {
     problem: &'a Problem<'a>,
     solver: FrameSolver<'a>,

@@ -60,7 +60,7 @@ impl<'a> Reconstructor<'a> {
         Ok(self)
     }
 
-    /// With somebody told whenever a part of a frame begins, so that its time can be taken: this crate has no clock.
+    /// Calls `watcher` whenever a part of a frame begins, so that it can be timed: this crate has no clock.
     pub fn watched(mut self, watcher: &'a (dyn Fn(FramePart) + Sync)) -> Self {
         self.problem.watcher = Some(watcher);
         self
@@ -149,7 +149,7 @@ impl<'a> Reconstructor<'a> {
 }
 
 /// Adds the frames before a start, in which nothing to start from was measured: the database's clip that the start was
-/// taken from, played backwards from there; less and less sure.
+/// taken from, played backwards from there; with growing uncertainty.
 fn play_back(
     problem: &Problem<'_>,
     solver: &mut FrameSolver<'_>,

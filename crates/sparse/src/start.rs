@@ -42,7 +42,7 @@ pub(crate) fn start(
     // Without two measured points there is nothing to fit: look at the first frame that has them.
     let has_two = |f: &usize| trajectories.frame(*f).iter().filter(|p| p.x.is_finite()).count() >= 2;
     let after = (frame..trajectories.num_frames()).find(has_two);
-    // Nothing comes any more: start as things stood when something was last measured.
+    // Nothing is measured any more: start from where things stood when something last was.
     let first = after.or_else(|| (0..frame).rev().find(has_two)).unwrap_or(frame);
     let ahead = problem.parameters.start_frames.min(trajectories.num_frames() - first);
     let offsets: Vec<usize> = (0..ahead).step_by(3).collect();
@@ -76,6 +76,6 @@ pub(crate) fn start(
         probes.truncate(keep);
     }
     let best = probes.into_iter().next().ok_or(Error::NoStart { frame })?;
-    // Where nothing comes any more, it goes on from here without measurements.
+    // Where nothing is measured any more, it continues from here without measurements.
     Ok(Start { track: best.start, frame: after.unwrap_or(frame), pose: best.pose })
 }

@@ -2,7 +2,7 @@
 //!
 //! Measured points c_t = f(y_t + o + e_t), where y_t is the mean of the neighbours' poses, e_t what this pose differs from
 //! them by (with their covariance) and o the performer's constant offsets. Linearised at the pose found, that is a
-//! linear-Gaussian measurement of o; its prior is what the database says of how performers differ.
+//! linear-Gaussian measurement of o; its prior is how performers of the database differ.
 
 use std::sync::Arc;
 
@@ -15,11 +15,11 @@ use crate::start::start;
 use crate::zero_pose_information::ZeroPoseInformation;
 use crate::{Parameters, Result};
 
-/// The first seconds are tracked and the offsets fitted so often.
+/// How often the first seconds are tracked and the offsets fitted.
 const ROUNDS: usize = 3;
-/// Every so many frames one is looked at: the next ones say the same.
+/// Frames between two that are looked at: those in between say the same.
 const STRIDE: usize = 4;
-/// So many frames say as much as one that stands for itself: what a person's pose differs from its neighbours by lasts.
+/// This many frames count as one independent frame: how a person's pose differs from its neighbours changes slowly.
 const CORRELATED_FRAMES: f64 = 150.0;
 
 /// Learns the performer's zero pose from the session's first frames, see [`crate::Reconstructor::learn_zero_pose`].

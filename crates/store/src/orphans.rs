@@ -7,7 +7,7 @@ use std::collections::HashSet;
 impl Store {
     /// Removes every object under `prefix` whose key is not in `keep`; returns how many.
     ///
-    /// To be called when nobody writes under `prefix` that anybody will ask for: a run that has ended.
+    /// To be called when no one writes under `prefix` any more, that is, after a run has ended.
     /// A worker that lost its lease may still write there later; what it writes is named by no row.
     ///
     /// # Errors

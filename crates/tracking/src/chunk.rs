@@ -20,7 +20,7 @@ pub struct ChunkPlan {
     pub end: usize,
 }
 
-/// Divides a session into chunks of `length` frames, each of which goes on for `overlap` frames of the next.
+/// Divides a session into chunks of `length` frames, each of which extends `overlap` frames into the next.
 pub fn plan_chunks(num_frames: usize, length: usize, overlap: usize) -> Vec<ChunkPlan> {
     let length = length.max(1);
     (0..num_frames)

@@ -37,7 +37,7 @@ pub enum Error {
         what: &'static str,
         /// its value
         found: f64,
-        /// what would do
+        /// what is valid
         expected: &'static str,
     },
     /// A silhouette or a calibration that can't be used.
@@ -60,7 +60,7 @@ pub enum Error {
         /// where the chunk before it ends
         expected: usize,
     },
-    /// Bytes that are no file of what was tracked.
+    /// Bytes that are not a file of tracked frames.
     #[error("not a file of tracked frames: {found}")]
     File {
         /// what is wrong with it

@@ -162,7 +162,7 @@ fn unseen(tracker: &mut Tracker<'_>, frame: usize, seen: &Seen, stop: &AtomicBoo
     tracker.track(&ObservedFrame::new(frame, &empty)?, stop)
 }
 
-/// Gives frames in which nobody was found the pose of the frame before them in which somebody was; at the beginning, of the
+/// Gives frames in which no person was found the pose of the last frame in which one was; at the beginning, of the
 /// one after. Returns how many there are.
 pub fn hold_unseen(model: &BodyModel, shape: &Shape, frames: &mut [Tracked]) -> usize {
     let is_seen = |tracked: &Tracked| tracked.stage != Stage::Unseen;

@@ -37,7 +37,7 @@ impl ObservedFrame {
     /// Prepares the silhouettes of a frame, on all cores; cameras that see nobody are left out.
     ///
     /// # Errors
-    /// [`Error::View`] for the first camera whose silhouette has another size or whose calibration can't be.
+    /// [`Error::View`] for the first camera whose silhouette has another size or whose calibration is invalid.
     pub fn new(index: usize, views: &[(Camera, Silhouette)]) -> Result<Self> {
         let prepare = |(camera, (calibration, silhouette)): (usize, &(Camera, Silhouette))| {
             let Some(observation) = Observation::new(calibration, silhouette)? else { return Ok(None) };

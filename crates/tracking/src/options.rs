@@ -81,7 +81,7 @@ impl Options {
     /// Checks all numbers.
     ///
     /// # Errors
-    /// [`Error::Option`] with the first that is of no use.
+    /// [`Error::Option`] with the first that is invalid.
     pub fn check(&self) -> Result<()> {
         let fail = |what, found, expected| Err(Error::Option { what, found, expected });
         if !(self.misaligned_m > 0.0 && self.misaligned_m.is_finite()) {

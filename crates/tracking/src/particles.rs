@@ -25,7 +25,7 @@ const SURVIVORS: f64 = 0.5;
 const SHRINK: f64 = 0.7;
 /// Spread of the root's rotation (radians) and translation (metres) beside that of angles.
 const ROOT_SPREAD: [f64; 2] = [0.4, 0.15];
-/// Of the first particles every so manyth takes the searched angles from a training pose, if the prior is used.
+/// Every n-th of the first particles takes the searched angles from a training pose, if the prior is used.
 const FROM_TRAINING: usize = 4;
 
 /// What a search found.

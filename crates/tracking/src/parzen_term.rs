@@ -20,7 +20,7 @@ impl Parzen {
     /// From poses of shape `[poses][dofs]`; of the root nothing is learned.
     ///
     /// # Errors
-    /// [`Error::TrainingPoses`] if there are fewer than three, all are alike, or one has not the rig's DOFs.
+    /// [`Error::TrainingPoses`] if there are fewer than three, all are alike, or one does not have the rig's DOFs.
     pub fn new(model: &BodyModel, poses: &[Vec<f64>]) -> Result<Self> {
         let dofs = model.rig().num_dofs();
         let is_pose = |pose: &Vec<f64>| pose.len() == dofs && pose.iter().all(|x| x.is_finite());

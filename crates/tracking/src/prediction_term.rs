@@ -18,7 +18,7 @@ impl PoseSpace {
     /// Principal directions of poses of shape `[poses][dofs]`; the root isn't looked at.
     ///
     /// # Errors
-    /// [`Error::TrainingPoses`] if there are fewer than three, or one has not the rig's DOFs.
+    /// [`Error::TrainingPoses`] if there are fewer than three, or one does not have the rig's DOFs.
     pub fn new(model: &BodyModel, poses: &[Vec<f64>]) -> Result<Self> {
         let dofs = model.rig().num_dofs();
         let is_pose = |pose: &Vec<f64>| pose.len() == dofs && pose.iter().all(|x| x.is_finite());

@@ -92,7 +92,7 @@ impl<'a> Tracker<'a> {
     /// built-in poses as the prior's.
     ///
     /// # Errors
-    /// [`Error::Shape`], [`Error::Pose`] or [`Error::Option`] if one of them can't be.
+    /// [`Error::Shape`], [`Error::Pose`] or [`Error::Option`] if one of them is invalid.
     pub fn new(model: &'a BodyModel, alpha: &[f64], start: &[f64], options: Options) -> Result<Self> {
         Self::with_training_poses(model, alpha, start, options, built_in_poses(model))
     }
@@ -204,7 +204,7 @@ impl<'a> Tracker<'a> {
         }
         self.before = std::mem::replace(&mut self.last, wound(&pose));
         if stage != Stage::Local {
-            // from a wrong pose to a right one is no velocity
+            // a jump from a wrong pose to a right one is not a velocity
             self.before.clone_from(&self.last);
         }
         self.lifter.remember(frame.index, &self.last, &misalignment);

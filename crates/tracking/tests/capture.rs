@@ -45,7 +45,7 @@ fn truth(folder: &Path, model: &BodyModel) -> Vec<Vec<Vector3<f64>>> {
     frames.iter().map(joints).collect()
 }
 
-/// There are pictures of every so manyth frame of cameras 0, 2, 4 and 6.
+/// There are pictures of every n-th frame of cameras 0, 2, 4 and 6.
 const PICTURES: usize = 4;
 
 /// Matches of the pictures of a camera, shape `[frames]`.

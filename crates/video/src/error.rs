@@ -19,7 +19,7 @@ pub enum Error {
         source: io::Error,
     },
     /// The program answered something unexpected.
-    #[error("{program} answered what can't be understood: {what}")]
+    #[error("{program} gave an unexpected answer: {what}")]
     Answer {
         /// its name
         program: String,
@@ -76,7 +76,7 @@ pub enum Error {
         /// largest number of frames
         limit: u64,
     },
-    /// An option that can't be.
+    /// An invalid option.
     #[error("{what}")]
     Option {
         /// what was found and what was expected

@@ -71,7 +71,7 @@ impl FrameReader {
     /// Looks into the file, checks the limits and starts to read.
     ///
     /// # Errors
-    /// As [`probe`]; [`Error::Option`] for a size or rate that can't be.
+    /// As [`probe`]; [`Error::Option`] for an invalid size or rate.
     pub fn open(source: &Source, options: &ReadOptions) -> Result<Self> {
         source.check()?;
         let mut probe = probe(source.path(), &options.programs, &options.limits)?;

@@ -110,7 +110,7 @@ fn codec(path: &Path) -> Result<&'static str> {
     }
 }
 
-/// Writes all files, one after the other. Ends early where nobody reads any more.
+/// Writes all files, one after the other. Ends early when the reader is gone.
 pub(crate) fn feed(files: &[PathBuf], mut to: impl Write) -> Result<()> {
     for path in files {
         let file = |source| Error::File { path: path.clone(), source };

@@ -42,7 +42,7 @@ impl FrameWriter {
     /// Starts to write frames of `size` (width and height, pixels) into a new file, or over an old one.
     ///
     /// # Errors
-    /// [`Error::Option`] for a size or rate that can't be, [`Error::ProgramMissing`].
+    /// [`Error::Option`] for an invalid size or rate, [`Error::ProgramMissing`].
     pub fn create(path: impl Into<PathBuf>, size: [u32; 2], options: &WriteOptions) -> Result<Self> {
         let path = path.into();
         if size.iter().any(|side| !(1..=16384).contains(side)) {

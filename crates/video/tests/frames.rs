@@ -197,7 +197,7 @@ fn reading_stops_when_it_is_cancelled_and_leaves_no_process() {
     let start = Instant::now();
     drop(reader);
     assert!(start.elapsed() < Duration::from_secs(5));
-    // a child of ours that ended but was not waited for would be a zombie, state Z; other tests' live ones are not
+    // a child process that ended but was not waited for would be a zombie, state Z; other tests' live ones are not
     let name = source_name(folder.path());
     let left = fs::read_dir("/proc").into_iter().flatten().flatten().filter(|entry| {
         fs::read(entry.path().join("cmdline"))

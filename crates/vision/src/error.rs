@@ -54,7 +54,7 @@ pub enum Error {
         /// cells allowed
         most: usize,
     },
-    /// A parameter that can't be.
+    /// A parameter out of range.
     #[error("{name} is {found}, expected {expected}")]
     Parameter {
         /// its name

@@ -22,10 +22,10 @@ pub struct RimPoint {
 }
 
 /// Finds the rim: midpoints of edges between a face that looks at the camera and one that doesn't, whose neighbour
-/// `reach` pixels outwards is no pixel of `silhouette`, the rendering of the same mesh in the same view. Points outside the
+/// `reach` pixels outwards is not a pixel of `silhouette`, the rendering of the same mesh in the same view. Points outside the
 /// image are left out. What `rim` held is replaced.
 ///
-/// Edges before another part of the body, or hidden behind one by more than `reach`, are no part of the outline and are not
+/// Edges before another part of the body, or hidden behind one by more than `reach`, are not part of the outline and are not
 /// found. One or two pixels of reach serve.
 ///
 /// # Panics

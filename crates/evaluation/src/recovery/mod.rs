@@ -160,7 +160,7 @@ impl Recovered {
 /// result doesn't depend on the number of threads.
 ///
 /// # Errors
-/// If a pose, training poses or options are of no use.
+/// If a pose, training poses or options are invalid.
 pub fn recover(
     setting: &Setting<'_>,
     methods: &[Method<'_>],

@@ -13,7 +13,7 @@ type Result<T> = std::result::Result<T, Error>;
 const EVERY_S: f64 = 0.2;
 /// Most poses that are chosen from: what choosing takes grows with their square.
 const MOST: usize = 12_000;
-/// One in so many more is chosen first, and the loneliest left out.
+/// This share more is chosen first, and the loneliest are left out.
 const SPARE: usize = 5;
 
 /// The poses of recordings on the body, in their order, 0.2 s apart: root, and angles within the rig's limits. Every recording
@@ -72,7 +72,7 @@ pub fn database_poses(
 /// from its nearest neighbour, and one odd pose would make it flat.
 ///
 /// # Errors
-/// [`Error::TooFewPoses`] if there are not so many.
+/// [`Error::TooFewPoses`] if there are fewer.
 pub fn training_poses(poses: &[Vec<f64>], count: usize) -> Result<Vec<Vec<f64>>> {
     if poses.len() < count {
         return Err(Error::TooFewPoses { found: poses.len(), every: EVERY_S, expected: count });

@@ -41,7 +41,7 @@ pub struct Entry {
     pub bytes: Vec<u8>,
 }
 
-/// The files of an archive in its order; the kind of archive is told by its content. What is no archive is one entry
+/// The files of an archive in its order; the kind of archive is told by its content. What is not an archive is one entry
 /// with `name`, unpacked if it is compressed. Members compressed singly are unpacked; archives inside are not opened.
 ///
 /// # Errors

@@ -63,7 +63,7 @@ struct FileCamera {
 /// where that leaves a doubt, by its name; a file with one camera without a name gives it the file's.
 ///
 /// # Errors
-/// If the file can't be read, has no camera, or has cameras that can't be: mirrored, not orthonormal, fisheye, two of a
+/// If the file can't be read, has no camera, or has invalid cameras: mirrored, not orthonormal, fisheye, two of a
 /// name, upside down, not looking at a common point, or in another unit than metres.
 pub fn read(name: &str, bytes: &[u8], options: &Options) -> Result<Read<Vec<Camera>>> {
     if bytes.len() > LARGEST {

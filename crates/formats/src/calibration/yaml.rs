@@ -8,7 +8,7 @@ use crate::{
     text::{Lines, quote},
 };
 
-/// Deeper nesting is no calibration.
+/// Deeper nesting is not a calibration.
 const DEEPEST: usize = 16;
 
 /// A line that says something, and the lines that its brackets continue on.

@@ -7,7 +7,7 @@ use crate::{
     text::{Lines, finite, name, quote},
 };
 
-/// What an `index.csv` says of one motion.
+/// One motion as `index.csv` describes it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Row {
     pub(super) subject: String,

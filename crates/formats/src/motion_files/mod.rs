@@ -71,7 +71,7 @@ pub fn is_motion_file(name: &str) -> bool {
 /// Hidden files and all others are left alone.
 ///
 /// # Errors
-/// If a file can't be read and is not to be skipped, or there is no motion at all. The file is named.
+/// If a file can't be read and is not to be skipped, or there is no motion. The file is named.
 pub fn clips(entries: &[Entry], options: &Options) -> Result<Read<Vec<MotionFile>>> {
     let mut files: Vec<(Path<'_>, &Entry)> = entries.iter().map(|e| (Path::from_name(&e.name), e)).collect();
     files.retain(|(path, _)| !path.is_hidden());

@@ -41,7 +41,7 @@ impl IndexFile {
     /// sections that were not verified give wrong answers; they do not panic.
     ///
     /// # Errors
-    /// If the bytes are no index file, are of another version, or contradict themselves, or its directory was damaged.
+    /// If the bytes are not an index file, are of another version, or contradict themselves, or its directory was damaged.
     pub fn open(bytes: Bytes) -> Result<Self> {
         read::open(bytes)
     }
@@ -89,7 +89,7 @@ impl MotionDatabase {
     /// Reads an index file; the whole of it is checked before anything is used.
     ///
     /// # Errors
-    /// If the bytes are no index file, are of another version, were damaged, or contradict themselves.
+    /// If the bytes are not an index file, are of another version, were damaged, or contradict themselves.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let file = IndexFile::open(Bytes::copy_from_slice(bytes))?;
         file.verify()?;

@@ -46,7 +46,7 @@ fn sizes_that_cannot_be_are_refused() {
         forged[8 + 4 * field..12 + 4 * field].copy_from_slice(&u32::MAX.to_le_bytes());
         assert!(matches!(Gplvm::from_bytes(&forged), Err(Error::Bytes { .. })), "field {field}");
     }
-    // With a right checksum and a number that is none.
+    // With a right checksum and a number that is not finite.
     bytes.truncate(bytes.len() - 32);
     bytes[24..32].copy_from_slice(&f64::NAN.to_le_bytes());
     let checksum = blake3::hash(&bytes);

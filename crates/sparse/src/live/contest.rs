@@ -31,11 +31,11 @@ pub(super) enum Phase {
     Over,
     /// the database is searched for challengers
     Search,
-    /// challengers run beside the leader, so many frames yet
+    /// challengers run beside the leader for this many more frames
     Heat { left: usize },
 }
 
-/// Finds out, without stopping, where the performer is.
+/// Finds out where the performer is while frames keep coming.
 ///
 /// The database is searched in slices for poses that fit the last frames; the best three then run beside the leader
 /// for a heat, and who made the measurements most probable leads on (evidence as in
@@ -159,7 +159,7 @@ impl Contest {
         }
     }
 
-    /// After a frame in which the leader made `step`: searches on, or goes on with the heat. Whether somebody else leads
+    /// After a frame in which the leader made `step`: continues the search or the heat. Whether another track leads
     /// now.
     pub fn advance(
         &mut self,
@@ -199,7 +199,7 @@ impl Contest {
         false
     }
 
-    /// The best leads on; whether it is somebody else.
+    /// The best track leads from now on; whether it is another one.
     fn end_heat(&mut self, leader: &mut Track) -> bool {
         let challengers = self.challengers[..self.active].iter();
         let best = challengers.min_by(|a, b| a.surprise.total_cmp(&b.surprise));

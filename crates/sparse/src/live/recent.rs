@@ -61,7 +61,7 @@ impl Recent {
         &self.positions[at * self.points..][..self.points]
     }
 
-    /// Whether a frame has two measured points: less says nothing about where somebody is.
+    /// Whether a frame has two measured points: fewer do not tell where the performer is.
     pub fn has_two(&self) -> bool {
         (0..self.len).any(|age| self.frame(age).iter().filter(|p| p.x.is_finite()).count() >= 2)
     }

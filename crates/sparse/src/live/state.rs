@@ -1,4 +1,4 @@
-//! What is known of a performer between two frames, as bytes: a stream that breaks off goes on elsewhere.
+//! What is known of a performer between two frames, as bytes, so that a broken stream can resume elsewhere.
 
 use std::fmt::Display;
 
@@ -63,9 +63,9 @@ struct ContestRecord {
 }
 
 impl Live<'_> {
-    /// All that is known of the performer; [`Self::resume`] goes on from it. A few kilobytes.
+    /// All that is known of the performer; [`Self::resume`] continues from it. A few kilobytes.
     ///
-    /// A stream that goes on from it gives the same poses, bit for bit, as one that was not interrupted; but a search of the
+    /// A stream that resumes from it gives the same poses, bit for bit, as one that was not interrupted; but a search of the
     /// database that was under way begins anew.
     pub fn state(&self) -> Vec<u8> {
         let tracks = self.tracks();
@@ -110,7 +110,7 @@ impl Live<'_> {
     /// Goes on from a [`Self::state`] of the same database, skeleton, points and window, in place of what was known.
     ///
     /// # Errors
-    /// If the bytes are something else, damaged, of something else, or hold numbers that no stream comes to. Nothing is
+    /// If the bytes are something else, damaged, of another database or session, or hold impossible numbers. Nothing is
     /// changed then.
     pub fn resume(&mut self, state: &[u8]) -> Result<()> {
         let Known { header, tracks, pose, variances, recent } = self.read(state)?;
@@ -253,7 +253,7 @@ fn check_variances(variances: &[f64]) -> Result<()> {
     }
 }
 
-/// What a state is only good for: the clips, the skeleton, the points and the window.
+/// What a state is valid for: the clips, the skeleton, the points and the window.
 fn fingerprint(problem: &Problem<'_>) -> String {
     let Problem { database, session, parameters, .. } = problem;
     let mut hasher = blake3::Hasher::new();

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use super::{HullView, cube::Cube};
 use crate::{DistanceField, View, raster::set_span, reduced};
 
-/// What one view says of places in space.
+/// What one view tells about places in space.
 #[derive(Debug, Clone)]
 pub(super) struct Cone {
     pub view: View,
@@ -21,7 +21,7 @@ pub(super) struct Cone {
 /// Pixels of the image along a side of one of the small silhouette.
 const SMALL: usize = 4;
 
-/// What a view says of a ball.
+/// What a view tells about a ball.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
     /// all of it is seen as background
@@ -67,7 +67,7 @@ impl Cone {
         self.depth_inside(place).map_or(-1.0, |(inside, _)| inside)
     }
 
-    /// What the view says of all places at most `radius` metres from `centre`, on the safe side.
+    /// What the view tells about all places at most `radius` metres from `centre`, on the safe side.
     pub fn judge(&self, centre: &Vector3<f64>, radius: f64) -> Verdict {
         let Some((inside, pixels_a_metre)) = self.depth_inside(centre) else { return Verdict::Mixed };
         let camera = &self.view.camera;

@@ -36,9 +36,9 @@ pub struct HullView<'a> {
 pub struct HullOptions {
     /// side of a cell, metres
     pub cell_m: f64,
-    /// a place is kept if all but so many views see it
+    /// a place is kept if all but this many views see it
     pub tolerated: usize,
-    /// at most so many views that disagree with the others are left out (see [`Agreement`])
+    /// at most this many views that disagree with the others are left out (see [`Agreement`])
     pub leave_out: usize,
     /// most cells of the box around the hull; one takes four bytes
     pub max_cells: usize,
