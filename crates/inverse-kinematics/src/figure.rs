@@ -1,4 +1,4 @@
-//! Who is followed: a morphable body or a skeleton, with the points of it that were measured.
+//! The figure: a morphable body or a skeleton, with the points of it that were measured.
 
 use std::sync::Arc;
 
@@ -7,20 +7,20 @@ use kinematics::{ControlPoint, Parametrisation, References};
 use model::Skeleton;
 use nalgebra::Vector3;
 
-use crate::follow::{Followed, Follower, Solved};
 use crate::rig::{self, RigChain};
+use crate::sequence::{FigureChain, SequenceSolver, Solved};
 use crate::{Chain, Error, Method, Result, SupportWidth};
 
 /// How far elbows and knees are bent where nothing else is known, radians.
 const BENT: f64 = 0.3;
 
-/// A body or a skeleton to be followed through frames.
+/// A body or a skeleton whose frames are solved.
 #[derive(Debug, Clone)]
 pub struct Figure {
-    body: Followed,
+    body: FigureChain,
     kind: Kind,
     /// indices among the chain's points of what was measured, in the order of the targets
-    pursued: Vec<usize>,
+    targeted: Vec<usize>,
     joint_names: Vec<String>,
     dof_names: Vec<String>,
 }
@@ -46,11 +46,15 @@ impl Figure {
         }
         let mut neutral = vec![0.0; rig.chain.num_dofs()];
         rig.coordinates(&pose, &mut neutral);
-        let body =
-            Followed { chain: rig.chain.clone(), neutral, twists: rig.twists().to_vec(), width: rig::WIDTH };
+        let body = FigureChain {
+            chain: rig.chain.clone(),
+            neutral,
+            twists: rig.twists().to_vec(),
+            width: rig::WIDTH,
+        };
         Ok(Self {
             body,
-            pursued: (joints..joints + measured.len()).collect(),
+            targeted: (joints..joints + measured.len()).collect(),
             joint_names: model.rig().joints().iter().map(|joint| joint.name.clone()).collect(),
             dof_names: model.rig().dofs().iter().map(|dof| dof.name.clone()).collect(),
             kind: Kind::Body { rig: Box::new(rig), dofs: pose.len() },
@@ -76,34 +80,34 @@ impl Figure {
         let chain = Chain::new(skeleton, parametrisation.clone(), points)?.with_segments(segments)?;
         let neutral = vec![0.0; chain.num_dofs()];
         Ok(Self {
-            body: Followed { chain, neutral, twists: Vec::new(), width: SupportWidth::default() },
+            body: FigureChain { chain, neutral, twists: Vec::new(), width: SupportWidth::default() },
             kind: Kind::Skeleton { skeleton: skeleton.clone(), parametrisation },
-            pursued: (joints.len()..joints.len() + measured.len()).collect(),
+            targeted: (joints.len()..joints.len() + measured.len()).collect(),
             joint_names: joints.iter().map(|joint| joint.name.clone()).collect(),
             dof_names: skeleton.dof_names(),
         })
     }
 
-    /// One to follow it; `steps`: most of one solve.
+    /// A solver of its frames; `steps`: most of one solve.
     ///
     /// # Errors
     /// [`Error::Setting`] if nothing of it is measured, or there is no step.
-    pub fn follower(&self, method: Method, steps: usize) -> Result<Follower> {
-        if self.pursued.is_empty() {
+    pub fn solver(&self, method: Method, steps: usize) -> Result<SequenceSolver> {
+        if self.targeted.is_empty() {
             let name = "number of measured points";
             return Err(Error::Setting { name, value: 0.0, expected: "1 or more" });
         }
         if steps == 0 {
             return Err(Error::Setting { name: "steps", value: 0.0, expected: "1 or more" });
         }
-        Follower::new(self.body.clone(), &self.pursued, method, steps)
+        SequenceSolver::new(self.body.clone(), &self.targeted, method, steps)
     }
 
     /// The targets of a frame. `measured`: metres, in the order of the points that the figure was made with; what is not finite
     /// was not measured.
     pub fn targets(&self, measured: &[Vector3<f64>]) -> Vec<Option<Vector3<f64>>> {
         let mut targets = vec![None; self.body.chain.points().len()];
-        for (&point, position) in self.pursued.iter().zip(measured) {
+        for (&point, position) in self.targeted.iter().zip(measured) {
             targets[point] = Some(*position).filter(|position| position.iter().all(|v| v.is_finite()));
         }
         targets

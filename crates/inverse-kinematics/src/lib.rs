@@ -12,7 +12,7 @@
 //!   null space is used for.
 //! - [`Support`], [`ImageView`]: silhouettes made ready. Any number of views.
 //! - [`Solver`]: the steps. They take no memory.
-//! - [`Figure`], [`follow::Follower`]: a body or a skeleton through frames of measured points and silhouettes, by a [`Method`].
+//! - [`Figure`], [`sequence::SequenceSolver`]: a body or a skeleton through frames of measured points and silhouettes, by a [`Method`].
 //! - [`experiment`]: limbs of recorded motion seen by synthetic cameras.
 //!
 //! ```
@@ -38,7 +38,6 @@ mod chain;
 mod error;
 mod figure;
 pub mod flesh;
-pub mod follow;
 mod gain;
 mod image;
 pub mod limb;
@@ -47,6 +46,7 @@ mod options;
 mod priority;
 pub mod recording;
 pub mod rig;
+pub mod sequence;
 mod solver;
 mod support;
 

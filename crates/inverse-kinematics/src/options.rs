@@ -35,7 +35,7 @@ pub struct Options {
     pub gain: f64,
     /// largest gain α
     pub max_gain: f64,
-    /// farthest that a target is pursued in one step, metres
+    /// farthest that a target is targeted in one step, metres
     pub max_reach_m: f64,
     /// greatest change of a coordinate in one step, radians or metres
     pub max_change: f64,

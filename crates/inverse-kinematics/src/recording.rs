@@ -67,13 +67,13 @@ impl Recording {
             let scale = puppet.leg_m / leg;
             let hips = middle(points) - centre;
             let hips = Vector3::new(hips.x, middle(points).y * scale, hips.z);
-            puppet.follow(points, &hips)
+            puppet.pose(points, &hips)
         });
         Ok(Self { poses: poses.collect::<Result<_>>()? })
     }
 }
 
-/// The body that follows recorded joints.
+/// The body posed by recorded joints.
 struct Puppet {
     rig: RigChain,
     solver: Solver,
@@ -103,8 +103,8 @@ impl Puppet {
         for (limb, (_, names)) in limbs.iter_mut().zip(LIMBS) {
             *limb = rig_joints(model, names)?;
         }
-        let pursued: Vec<_> = limbs.iter().flat_map(|limb| [limb[1], limb[2]]).collect();
-        let options = Options { steps: 60, ..Options::reach(&pursued) };
+        let targeted: Vec<_> = limbs.iter().flat_map(|limb| [limb[1], limb[2]]).collect();
+        let options = Options { steps: 60, ..Options::reach(&targeted) };
         let solver = Solver::new(rig.chain.clone(), options)?;
         let leg = limbs[2].map(|joint| shape.joints[joint]);
         Ok(Self {
@@ -118,7 +118,7 @@ impl Puppet {
     }
 
     /// The pose whose bones point as those between the recorded `points` do, with the hips there.
-    fn follow(&mut self, points: &[Vector3<f64>], hips: &Vector3<f64>) -> Result<Vec<f64>> {
+    fn pose(&mut self, points: &[Vector3<f64>], hips: &Vector3<f64>) -> Result<Vec<f64>> {
         let bases = [0, 1, 2, 3].map(|limb: usize| points[3 * limb]);
         let rest = self.limbs.map(|limb| self.rest[limb[0]]);
         let rotation = trunk(bases) * trunk(rest).transpose();

@@ -20,7 +20,7 @@ pub struct Evidence<'a> {
 pub struct Outcome {
     /// steps taken
     pub steps: usize,
-    /// greatest distance of a pursued point from its target, metres
+    /// greatest distance of a targeted point from its target, metres
     pub residual_m: f64,
     /// overlap h with the images, in [−1, 1]; 0 without images
     pub overlap: f64,
@@ -280,11 +280,11 @@ impl Solver {
     }
 
     fn residual(&self, evidence: &Evidence<'_>) -> f64 {
-        let pursued = self.options.levels.iter().flatten().filter_map(|task| match task {
+        let targeted = self.options.levels.iter().flatten().filter_map(|task| match task {
             Task::Reach(points) => Some(points),
             _ => None,
         });
-        let misses = pursued.flatten().filter_map(|&point| {
+        let misses = targeted.flatten().filter_map(|&point| {
             let target = evidence.targets[point].filter(is_finite)?;
             Some((target - self.positions[point]).norm())
         });

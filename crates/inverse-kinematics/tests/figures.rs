@@ -56,11 +56,11 @@ fn seen(model: &BodyModel) -> Vec<(Vec<Vector3<f64>>, Views)> {
 /// Mean distance of elbows and knees from the true ones, millimetres, and of the measured points from where they were.
 fn errors(model: &BodyModel, method: Method, frames: &[(Vec<Vector3<f64>>, Views)]) -> [f64; 2] {
     let figure = Figure::body(model, &model.shape(&[]), &points(model)).unwrap();
-    let mut follower = figure.follower(method, 15).unwrap();
+    let mut solver = figure.solver(method, 15).unwrap();
     let (mut inner, mut ends) = (0.0, 0.0);
     for (truth, views) in frames {
         let measured: Vec<_> = points(model).iter().map(|point| truth[point.joint]).collect();
-        let solved = follower.next(&figure.targets(&measured), views).unwrap();
+        let solved = solver.next(&figure.targets(&measured), views).unwrap();
         let found = figure.joints(&solved);
         let off = |name: &&str| {
             let joint = model.rig().joint_index(name).unwrap();
@@ -102,7 +102,7 @@ fn silhouettes_find_the_elbows_and_knees_of_a_body_whose_ends_are_measured() {
 fn frames_without_measurements_keep_the_pose_and_lost_ones_are_found_again() {
     let model = BodyModel::shipped();
     let figure = Figure::body(&model, &model.shape(&[]), &points(&model)).unwrap();
-    let mut follower = figure.follower(Method::Priority, 15).unwrap();
+    let mut solver = figure.solver(Method::Priority, 15).unwrap();
     let mut posed = Posed::default();
     let mut measured = |frame: usize, turned: f64| {
         let mut pose = pose(&model, frame);
@@ -110,12 +110,12 @@ fn frames_without_measurements_keep_the_pose_and_lost_ones_are_found_again() {
         model.shape(&[]).pose_joints(&model, &pose, &mut posed);
         points(&model).iter().map(|point| posed.joints[point.joint]).collect::<Vec<_>>()
     };
-    let first = follower.next(&figure.targets(&measured(0, 0.0)), &[]).unwrap();
+    let first = solver.next(&figure.targets(&measured(0, 0.0)), &[]).unwrap();
     let nothing = vec![Vector3::repeat(f64::NAN); MEASURED.len()];
-    let kept = follower.next(&figure.targets(&nothing), &[]).unwrap();
+    let kept = solver.next(&figure.targets(&nothing), &[]).unwrap();
     assert_eq!((kept.residual_m, kept.x), (None, first.x));
     // they stand with their back to where they looked
-    let turned = follower.next(&figure.targets(&measured(3, 3.0)), &[]).unwrap();
+    let turned = solver.next(&figure.targets(&measured(3, 3.0)), &[]).unwrap();
     assert!(turned.residual_m.unwrap() < 0.03, "{:?}", turned.residual_m);
 }
 
@@ -125,7 +125,7 @@ fn a_skeleton_is_followed_by_its_hands_and_feet() {
     let skeleton = Arc::new(model.skeleton(&model.shape(&[])).unwrap());
     let measured = control_points(&skeleton, &MEASURED).unwrap();
     let figure = Figure::skeleton(&skeleton, &measured).unwrap();
-    let mut follower = figure.follower(Method::Priority, 15).unwrap();
+    let mut solver = figure.solver(Method::Priority, 15).unwrap();
     let truth = model.motion(&model.shape(&[]), &[pose(&model, 0), pose(&model, 1)], 30.0).unwrap();
     let kinematics = Kinematics::new(&skeleton, Parametrisation::channels(&skeleton));
     let mut state = kinematics.state();
@@ -133,7 +133,7 @@ fn a_skeleton_is_followed_by_its_hands_and_feet() {
     for pose in truth.poses() {
         kinematics.update(pose, &mut state);
         let at: Vec<_> = measured.iter().map(|point| state.point(point.joint, &point.offset)).collect();
-        let solved = follower.next(&figure.targets(&at), &[]).unwrap();
+        let solved = solver.next(&figure.targets(&at), &[]).unwrap();
         assert!(solved.residual_m.unwrap() < 0.02, "{:?}", solved.residual_m);
         let found = figure.pose(&solved, before.as_deref());
         kinematics.update(&found, &mut state);
@@ -148,8 +148,8 @@ fn a_skeleton_is_followed_by_its_hands_and_feet() {
 fn figures_that_nothing_is_measured_of_are_refused() {
     let model = BodyModel::shipped();
     let figure = Figure::body(&model, &model.shape(&[]), &[]).unwrap();
-    let error = figure.follower(Method::Plain, 15).unwrap_err();
+    let error = figure.solver(Method::Plain, 15).unwrap_err();
     assert_eq!(error.to_string(), "number of measured points is 0, expected 1 or more");
     let figure = Figure::body(&model, &model.shape(&[]), &points(&model)).unwrap();
-    assert_eq!(figure.follower(Method::Plain, 0).unwrap_err().to_string(), "steps is 0, expected 1 or more");
+    assert_eq!(figure.solver(Method::Plain, 0).unwrap_err().to_string(), "steps is 0, expected 1 or more");
 }

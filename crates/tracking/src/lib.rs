@@ -1,7 +1,7 @@
-//! A person's pose followed through the calibrated silhouettes of several cameras (docs/papers.md#tracking), the
+//! A person's pose tracked through the calibrated silhouettes of several cameras (docs/papers.md#tracking), the
 //! shape being known, and through points of the skin that cameras find again ([`ObservedFrame::with_matches`]).
 //!
-//! [`Tracker`] takes frame after frame: the pose is predicted, fitted to the contours ([`Tracker::refine`]), judged limb by
+//! [`Tracker`] takes frame after frame: the pose is predicted, fitted to the contours ([`Tracker::optimise`]), judged limb by
 //! limb ([`Misalignment`]), and searched for by particles where limbs are misaligned ([`Tracker::search`]), then fitted again.
 //! [`track_chunk`] does so for a run of frames that begins with a key frame of its own, [`merge`] puts such runs together.
 //! The method, its thresholds, and what it was measured to do are in `docs/tracking.md`.
@@ -11,7 +11,7 @@
 mod chunk;
 mod chunk_file;
 mod error;
-mod follow;
+mod footage;
 mod joint_limit_term;
 mod lift;
 mod local;
@@ -30,7 +30,7 @@ mod training_poses;
 
 pub use chunk::{Chunk, ChunkPlan, Merged, Seam, merge, plan_chunks, track_chunk, track_frames};
 pub use error::Error;
-pub use follow::{Footage, Seen, follow, hold_unseen};
+pub use footage::{Footage, Seen, hold_unseen, track_footage};
 pub use joint_limit_term::joint_limit_energy;
 pub use misalignment::{LimbError, Misalignment};
 pub use observed_frame::ObservedFrame;

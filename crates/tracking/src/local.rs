@@ -84,7 +84,7 @@ impl Local {
     }
 
     /// The pose near the best of several starts. `goes_on` is asked before every evaluation.
-    pub fn refine(
+    pub fn optimise(
         &mut self,
         problem: &Problem<'_>,
         starts: &[&[f64]],

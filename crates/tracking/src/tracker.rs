@@ -69,7 +69,7 @@ enum Attempt {
 /// Limbs are searched one by one where an error is still above this many times the threshold.
 const FAR: f64 = 2.5;
 
-/// Follows one person of known shape from frame to frame.
+/// Tracks one person of known shape from frame to frame.
 pub struct Tracker<'a> {
     model: &'a BodyModel,
     topology: Topology,
@@ -181,7 +181,7 @@ impl<'a> Tracker<'a> {
         let last = self.last.clone();
         let goes_on = || !stop.load(Ordering::Relaxed);
         let starts = [prediction.as_slice(), last.as_slice()];
-        let mut pose = self.refine(frame, &prediction, &starts, &goes_on).ok_or(stopped.clone())?;
+        let mut pose = self.optimise(frame, &prediction, &starts, &goes_on).ok_or(stopped.clone())?;
         let mut misalignment = self.misalignment(frame, &pose);
         let (mut stage, mut effective_sample_size) = (Stage::Local, None);
         if misalignment.any() {
@@ -193,11 +193,11 @@ impl<'a> Tracker<'a> {
                 let found = self.attempt(frame, &prediction, &pose, &misalignment, attempt, &goes_on);
                 let Some(found) = found.ok_or(stopped.clone())? else { break };
                 effective_sample_size = Some(found.effective_sample_size);
-                let refined = self.refine(frame, &prediction, &[&found.pose], &goes_on);
-                let refined = refined.ok_or(stopped.clone())?;
-                let after = self.misalignment(frame, &refined);
+                let optimised = self.optimise(frame, &prediction, &[&found.pose], &goes_on);
+                let optimised = optimised.ok_or(stopped.clone())?;
+                let after = self.misalignment(frame, &optimised);
                 if after.total_m() < misalignment.total_m() {
-                    (pose, misalignment) = (refined, after);
+                    (pose, misalignment) = (optimised, after);
                 }
             }
             stage = if misalignment.any() { Stage::Misaligned } else { Stage::Particles };
@@ -213,7 +213,7 @@ impl<'a> Tracker<'a> {
 
     /// Local optimisation: the pose that a frame's contours, and its matches with frames that were tracked, pull the best of
     /// several starts to, with the prior about `prediction`. `None` if `goes_on` said no.
-    pub fn refine(
+    pub fn optimise(
         &mut self,
         frame: &ObservedFrame,
         prediction: &[f64],
@@ -232,7 +232,7 @@ impl<'a> Tracker<'a> {
             predicted: prediction,
             options: &self.options.fit,
         };
-        self.local.refine(&problem, starts, goes_on)
+        self.local.optimise(&problem, starts, goes_on)
     }
 
     /// How every limb of a pose fits a frame.

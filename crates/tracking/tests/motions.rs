@@ -10,8 +10,8 @@ use body::BodyModel;
 use model::{Camera, Silhouette};
 use moving::{cameras, distances, mixed, pose, seen};
 use tracking::{
-    Chunk, Error, Footage, ObservedFrame, Options, Seen, Stage, Tracker, follow, hold_unseen, merge,
-    plan_chunks, track_chunk,
+    Chunk, Error, Footage, ObservedFrame, Options, Seen, Stage, Tracker, hold_unseen, merge, plan_chunks,
+    track_chunk, track_footage,
 };
 use vision::scene::SilhouetteNoise;
 
@@ -204,7 +204,7 @@ fn a_person_who_comes_late_and_leaves_is_followed_from_where_they_are_found() {
     let rest = vec![0.0; model.rig().num_dofs()];
     let mut tracker = Tracker::new(&model, &shape.alpha, &rest, Options::default()).unwrap();
     let mut done = Vec::new();
-    let mut chunk = follow(&mut tracker, footage, &GO, |frames| done.push(frames)).unwrap();
+    let mut chunk = track_footage(&mut tracker, footage, &GO, |frames| done.push(frames)).unwrap();
     assert!(done.iter().copied().eq(0..=motion.len()));
     assert!(chunk.frames.iter().map(|tracked| tracked.frame).eq(0..motion.len()));
     assert_eq!(hold_unseen(&model, &shape, &mut chunk.frames), 4);
@@ -234,6 +234,6 @@ fn following_stops_when_it_is_told_to() {
         find: |_: &[(Camera, Silhouette)]| Some(pose.clone()),
     };
     let mut tracker = Tracker::new(&model, &[], &pose, Options::default()).unwrap();
-    let stopped = follow(&mut tracker, footage, &AtomicBool::new(true), |_| ());
+    let stopped = track_footage(&mut tracker, footage, &AtomicBool::new(true), |_| ());
     assert_eq!(stopped, Err(Error::Stopped { frame: 3 }));
 }

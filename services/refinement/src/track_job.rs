@@ -10,7 +10,7 @@ use service::{
     compute::{self, StopOnDrop},
     objects,
 };
-use tracking::{Chunk, Footage, Seen, Tracker, follow};
+use tracking::{Chunk, Footage, Seen, Tracker, track_footage};
 
 use crate::{InputError, Shared, options};
 
@@ -90,7 +90,7 @@ fn track(
             found.ok().map(|fit| fit.pose)
         },
     };
-    follow(&mut tracker, footage, stop, |done| {
+    track_footage(&mut tracker, footage, stop, |done| {
         let part = format!("part {} of {}", payload.chunk + 1, payload.num_chunks);
         let phrase = format!("{part}: frame {done} of {num_frames}");
         context.progress(done as f64 / num_frames.max(1) as f64, phrase);

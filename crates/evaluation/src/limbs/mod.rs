@@ -171,7 +171,7 @@ impl LimbErrors {
     }
 }
 
-/// Follows both limbs through a recording with every method. `see` makes of a silhouette (frame, camera) what the computer
+/// Solves both limbs through a recording with every method. `see` makes of a silhouette (frame, camera) what the computer
 /// is shown: itself, or a noisy one.
 ///
 /// # Errors
@@ -216,7 +216,7 @@ pub fn run(
                     support: Support::seen_at(fields[camera].clone(), &cameras[camera], &base, limb.width),
                 })
                 .collect();
-            let residual_m = limb.follow(&base, &end, heading, &seen)?;
+            let residual_m = limb.solve(&base, &end, heading, &seen)?;
             let errors = &mut errors[index / 2];
             errors.inner_mm.push(1000.0 * (limb.found - inner).norm());
             errors.residual_mm += 1000.0 * residual_m / (2 * recording.poses.len()) as f64;

@@ -53,7 +53,7 @@ impl Still {
         });
         let views: Vec<_> = views.collect();
         let mut limb = Tracked::new(model, shape, limbs, index, method)?;
-        limb.follow(&base, &end, heading(model, limbs, &posed)?, &views)?;
+        limb.solve(&base, &end, heading(model, limbs, &posed)?, &views)?;
         let Tracked { limb, solver, x: mut start, posture, .. } = limb;
         limb.swivel(&mut start, &(end - base), 0.4);
         let mut targets = vec![None; solver.chain().points().len()];

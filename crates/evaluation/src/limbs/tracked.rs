@@ -74,7 +74,7 @@ impl Tracked {
     }
 
     /// One frame; returns how far the end is from its target, metres.
-    pub fn follow(
+    pub fn solve(
         &mut self,
         base: &Vector3<f64>,
         end: &Vector3<f64>,

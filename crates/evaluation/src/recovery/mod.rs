@@ -195,10 +195,10 @@ fn run(setting: &Setting<'_>, start: &Start, method: &Method<'_>) -> Result<Reco
     let dofs = setting.limbs.dofs(setting.model);
     let search = tracker.search_dofs(frame, &start.disturbed, &start.disturbed, &dofs, &goes_on).flatten();
     let searched = search.map_or_else(|| start.disturbed.clone(), |search| search.pose);
-    let refined = tracker.refine(frame, &start.disturbed, &[&searched], &goes_on);
+    let optimised = tracker.optimise(frame, &start.disturbed, &[&searched], &goes_on);
     let error_m = |pose: &[f64]| farthest(&start.joints_at(setting.model, pose), &start.joints);
     let searched_m = error_m(&searched);
-    Ok(Recovered { searched_m, final_m: refined.map_or(searched_m, |pose| error_m(&pose)) })
+    Ok(Recovered { searched_m, final_m: optimised.map_or(searched_m, |pose| error_m(&pose)) })
 }
 
 fn farthest(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {

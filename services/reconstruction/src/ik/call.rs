@@ -79,7 +79,7 @@ pub(crate) fn solve(
     let has_images = request.frames.iter().any(|frame| !frame.silhouettes.is_empty());
     let (method, wire) = method(request.method(), has_images);
     let steps = if request.steps == 0 { DEFAULT_STEPS } else { request.steps as usize };
-    let mut follower = figure.follower(method, steps).map_err(InputError::from)?;
+    let mut solver = figure.solver(method, steps).map_err(InputError::from)?;
     let mut warnings: Vec<String> = Vec::new();
     let mut frames = Vec::with_capacity(request.frames.len());
     let mut before: Option<Vec<f64>> = None;
@@ -96,7 +96,7 @@ pub(crate) fn solve(
             read.views
         };
         let targets = figure.targets(trajectories.frame(index));
-        let solved = follower.next(&targets, &seen).map_err(InputError::from)?;
+        let solved = solver.next(&targets, &seen).map_err(InputError::from)?;
         let pose = figure.pose(&solved, before.as_deref());
         frames.push(v1::InverseKinematicsSolution {
             pose: Some(proto::poses::to_wire(&pose)),

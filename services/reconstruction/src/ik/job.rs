@@ -5,7 +5,7 @@ use std::sync::Arc;
 use body::{BodyModel, Shape};
 use camera_jobs::{Described, Silhouettes, reports};
 use formats::FileRole;
-use inverse_kinematics::{Figure, follow::Solved};
+use inverse_kinematics::{Figure, sequence::Solved};
 use jobs::{
     InputFile,
     inverse_kinematics::{SolveInverseKinematics, frame_rate},
@@ -61,14 +61,14 @@ impl Handler for IkHandler {
         let (watched, how) = (context.clone(), request.how.clone());
         let solved = compute::run(move || -> Result<_, InputError> {
             let Problem { figure, measured, .. } = &problem;
-            let mut follower = figure.follower(method(how.solver), how.steps)?;
+            let mut solver = figure.solver(method(how.solver), how.steps)?;
             let mut solved = Vec::with_capacity(count);
             for (index, measured) in measured.iter().enumerate() {
                 if watched.is_cancelled() {
                     break;
                 }
                 let views = silhouettes.views(first + index)?;
-                solved.push(follower.next(&figure.targets(measured), &views)?);
+                solved.push(solver.next(&figure.targets(measured), &views)?);
                 watched.progress(
                     0.02 + 0.9 * (index + 1) as f64 / count as f64,
                     format!("frame {} of {count}", index + 1),

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use body::{BodyModel, Shape};
-use inverse_kinematics::follow::Solved;
+use inverse_kinematics::sequence::Solved;
 use jobs::{
     JobReport,
     inverse_kinematics::SolveInverseKinematics,

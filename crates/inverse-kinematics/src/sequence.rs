@@ -1,4 +1,4 @@
-//! A whole body followed through frames of targets and silhouettes.
+//! A whole body through frames of targets and silhouettes.
 
 use std::sync::Arc;
 
@@ -9,9 +9,9 @@ use vision::DistanceField;
 
 use crate::{Chain, Evidence, ImageView, Method, Outcome, Result, Solver, Support, SupportWidth};
 
-/// What a chain is, beside its joints, to be followed.
+/// A chain with what its frames are solved by.
 #[derive(Debug, Clone)]
-pub struct Followed {
+pub struct FigureChain {
     /// the chain; its first six coordinates are the root's translation, heading and tilt
     pub chain: Chain,
     /// where its coordinates like to be; those of the root don't count; shape `[dofs]`
@@ -37,11 +37,11 @@ pub struct Solved {
     pub steps: usize,
 }
 
-/// Follows a chain through frames, each from the solution of the one before. The first, and those after a loss, start from the
+/// Solves the frames of a chain in turn, each from the solution of the one before. The first, and those after a loss, start from the
 /// neutral posture in eight headings.
 #[derive(Debug, Clone)]
-pub struct Follower {
-    body: Followed,
+pub struct SequenceSolver {
+    body: FigureChain,
     solver: Solver,
     method: Method,
     /// the last solution
@@ -63,18 +63,18 @@ const LOST_M: f64 = 0.1;
 /// Coordinates of the root: no posture is preferred there.
 const ROOT: usize = 6;
 
-impl Follower {
-    /// Nothing is followed yet. `pursued`: the points that may have targets.
+impl SequenceSolver {
+    /// Nothing is solved yet. `targeted`: the points that may have targets.
     ///
     /// # Errors
     /// If the method's options don't fit the chain.
-    pub fn new(body: Followed, pursued: &[usize], method: Method, steps: usize) -> Result<Self> {
-        let options = crate::Options { steps, ..method.options(pursued) };
+    pub fn new(body: FigureChain, targeted: &[usize], method: Method, steps: usize) -> Result<Self> {
+        let options = crate::Options { steps, ..method.options(targeted) };
         Ok(Self { solver: Solver::new(body.chain.clone(), options)?, body, method, last: None })
     }
 
-    /// What is followed.
-    pub fn body(&self) -> &Followed {
+    /// The chain.
+    pub fn body(&self) -> &FigureChain {
         &self.body
     }
 

@@ -50,7 +50,7 @@ pub struct Footage<S, F> {
 ///
 /// # Errors
 /// [`Error::View`] and [`Error::Stopped`] as from [`Tracker::track`], and those of `see`.
-pub fn follow<S, F, E>(
+pub fn track_footage<S, F, E>(
     tracker: &mut Tracker<'_>,
     footage: Footage<S, F>,
     stop: &AtomicBool,
@@ -63,7 +63,7 @@ where
 {
     let Footage { frames, mut see, mut find } = footage;
     let mut tracked: Vec<Tracked> = Vec::with_capacity(frames.len());
-    // frames from here on wait for a pose; none do while the person is followed
+    // frames from here on wait for a pose; none do while the person is tracked
     let mut waiting = Some(frames.start);
     let mut next_try = frames.start;
     for frame in frames.clone() {
