@@ -6,8 +6,8 @@ use model::{Axis, Channel, ChannelKind, Joint, Skeleton};
 use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::chance::{Chance, Purpose};
 use crate::components::principal;
+use crate::random::{Purpose, RandomStream};
 use crate::{Error, Result};
 
 /// Components of body size that are kept.
@@ -81,8 +81,8 @@ impl Body {
 
     /// A skeleton drawn by seed.
     pub fn draw(&self, subject: u64) -> Result<Arc<Skeleton>> {
-        let mut chance = Chance::new(Purpose::Body, [0, subject, 0]);
-        let scores: Vec<f64> = self.components.iter().map(|_| chance.normal_within(2.0)).collect();
+        let mut random = RandomStream::new(Purpose::Body, [0, subject, 0]);
+        let scores: Vec<f64> = self.components.iter().map(|_| random.normal_within(2.0)).collect();
         self.with_scores(&format!("synthetic {subject}"), &scores)
     }
 

@@ -2,11 +2,11 @@ use std::f64::consts::TAU;
 
 use model::Motion;
 
-use crate::chance::{Chance, Purpose};
 use crate::features::{CHANNELS, CONTACT, TILT};
 use crate::frame_rate::FRAME_RATE;
 use crate::ground;
 use crate::movement::{Model, Movement};
+use crate::random::{Purpose, RandomStream};
 use crate::segment::piecewise;
 use crate::signal::{bend_into, smooth, smoothstep};
 use crate::{Action, Error, Result};
@@ -60,25 +60,25 @@ impl Model {
         }
         let movements: Vec<&Movement> = self.movements.iter().filter(|m| m.shape.action == action).collect();
         let Some(first) = movements.first() else { return Err(Error::ActionNotLearned { action }) };
-        let mut chance = Chance::new(Purpose::Trial, [action as u64, options.subject, seed]);
-        let style = draw_style(first.style.len(), action, options.subject, &mut chance);
+        let mut random = RandomStream::new(Purpose::Trial, [action as u64, options.subject, seed]);
+        let style = draw_style(first.style.len(), action, options.subject, &mut random);
         let mut rows = match first.shape.basis {
-            crate::basis::Basis::Cycle { .. } => cyclic_rows(first, &style, options.frames, &mut chance),
-            crate::basis::Basis::Once { .. } => event_rows(&movements, &style, options.frames, &mut chance),
+            crate::basis::Basis::Cycle { .. } => cyclic_rows(first, &style, options.frames, &mut random),
+            crate::basis::Basis::Once { .. } => event_rows(&movements, &style, options.frames, &mut random),
         };
         for row in &mut rows {
             for (value, &(low, high)) in row[..CONTACT].iter_mut().zip(&first.shape.ranges) {
                 *value = bend_into(*value, low, high);
             }
         }
-        ground::walk_on(self, &self.skeleton(options.subject)?, &rows, chance.between(-3.0, 3.0))
+        ground::walk_on(self, &self.skeleton(options.subject)?, &rows, random.between(-3.0, 3.0))
     }
 }
 
 /// Scores of the style components: partly the subject's own, partly this trial's. The sum is cut again: a few trials
 /// do not say how far a style may go.
-fn draw_style(components: usize, action: Action, subject: u64, trial: &mut Chance) -> Vec<f64> {
-    let mut personal = Chance::new(Purpose::PersonalStyle, [action as u64, subject, 0]);
+fn draw_style(components: usize, action: Action, subject: u64, trial: &mut RandomStream) -> Vec<f64> {
+    let mut personal = RandomStream::new(Purpose::PersonalStyle, [action as u64, subject, 0]);
     (0..components)
         .map(|_| {
             let own = PERSONAL_SHARE.sqrt() * personal.normal_within(MOST_DEVIATIONS);
@@ -94,13 +94,13 @@ struct Wander {
 }
 
 impl Wander {
-    fn new(movement: &Movement, chance: &mut Chance) -> Self {
-        Self { scores: movement.variation.iter().map(|_| chance.normal_within(MOST_DEVIATIONS)).collect() }
+    fn new(movement: &Movement, random: &mut RandomStream) -> Self {
+        Self { scores: movement.variation.iter().map(|_| random.normal_within(MOST_DEVIATIONS)).collect() }
     }
 
-    fn step(&mut self, movement: &Movement, chance: &mut Chance) {
+    fn step(&mut self, movement: &Movement, random: &mut RandomStream) {
         for (score, p) in self.scores.iter_mut().zip(&movement.shape.persistence) {
-            *score = p * *score + (1.0 - p * p).sqrt() * chance.normal_within(MOST_DEVIATIONS);
+            *score = p * *score + (1.0 - p * p).sqrt() * random.normal_within(MOST_DEVIATIONS);
         }
     }
 
@@ -134,14 +134,14 @@ fn cyclic_rows(
     movement: &Movement,
     style: &[f64],
     frames: usize,
-    chance: &mut Chance,
+    random: &mut RandomStream,
 ) -> Vec<[f64; CHANNELS]> {
-    let mut wander = Wander::new(movement, chance);
+    let mut wander = Wander::new(movement, random);
     let mut current = wander.numbers(movement, style);
-    wander.step(movement, chance);
+    wander.step(movement, random);
     let mut next = wander.numbers(movement, style);
     let mut values = vec![0.0; movement.shape.basis.len()];
-    let mut phase = chance.uniform();
+    let mut phase = random.uniform();
     let mut rows = Vec::with_capacity(frames);
     for _ in 0..frames {
         let share = smoothstep(phase);
@@ -150,7 +150,7 @@ fn cyclic_rows(
         phase += 1.0 / (FRAME_RATE * duration_secs(blended[0]));
         if phase >= 1.0 {
             phase -= 1.0;
-            wander.step(movement, chance);
+            wander.step(movement, random);
             current = std::mem::replace(&mut next, wander.numbers(movement, style));
         }
     }
@@ -162,16 +162,16 @@ fn event_rows(
     movements: &[&Movement],
     style: &[f64],
     frames: usize,
-    chance: &mut Chance,
+    random: &mut RandomStream,
 ) -> Vec<[f64; CHANNELS]> {
-    let mut wanders: Vec<Wander> = movements.iter().map(|m| Wander::new(m, chance)).collect();
+    let mut wanders: Vec<Wander> = movements.iter().map(|m| Wander::new(m, random)).collect();
     let mut rows: Vec<[f64; CHANNELS]> = Vec::with_capacity(frames);
     while rows.len() < frames {
-        let index = pick(movements, chance);
+        let index = pick(movements, random);
         let movement = movements[index];
-        wanders[index].step(movement, chance);
+        wanders[index].step(movement, random);
         let event = event(movement, &wanders[index].numbers(movement, style));
-        let pause_secs = chance.between(movement.shape.pause_secs.0, movement.shape.pause_secs.1);
+        let pause_secs = random.between(movement.shape.pause_secs.0, movement.shape.pause_secs.1);
         let from = rows.last().copied().unwrap_or(event[0]);
         let pause = (pause_secs.max(least_pause_secs(&from, &event[0])) * FRAME_RATE) as usize;
         for i in 0..pause {
@@ -181,7 +181,7 @@ fn event_rows(
         rows.extend(event);
     }
     rows.truncate(frames);
-    sway(&mut rows, chance);
+    sway(&mut rows, random);
     for channel in 0..CHANNELS {
         let smoothed = smooth(&rows.iter().map(|r| r[channel]).collect::<Vec<_>>(), EVENT_SMOOTHING);
         rows.iter_mut().zip(smoothed).for_each(|(row, v)| row[channel] = v);
@@ -197,11 +197,11 @@ fn least_pause_secs(from: &[f64; CHANNELS], to: &[f64; CHANNELS]) -> f64 {
 }
 
 /// Nobody stands quite still: slow waves on every angle.
-fn sway(rows: &mut [[f64; CHANNELS]], chance: &mut Chance) {
+fn sway(rows: &mut [[f64; CHANNELS]], random: &mut RandomStream) {
     for channel in TILT..CONTACT {
         for _ in 0..2 {
-            let amplitude = SWAY_RAD * chance.normal_within(MOST_DEVIATIONS);
-            let (hertz, start) = (chance.between(0.15, 0.7), chance.between(0.0, TAU));
+            let amplitude = SWAY_RAD * random.normal_within(MOST_DEVIATIONS);
+            let (hertz, start) = (random.between(0.15, 0.7), random.between(0.0, TAU));
             for (frame, row) in rows.iter_mut().enumerate() {
                 row[channel] += amplitude * (start + TAU * hertz * frame as f64 / FRAME_RATE).sin();
             }
@@ -226,8 +226,8 @@ fn event(movement: &Movement, numbers: &[f64]) -> Vec<[f64; CHANNELS]> {
 }
 
 /// One of the movements, each as often as its share says.
-fn pick(movements: &[&Movement], chance: &mut Chance) -> usize {
-    let mut left = chance.uniform() * movements.iter().map(|m| m.shape.share).sum::<f64>();
+fn pick(movements: &[&Movement], random: &mut RandomStream) -> usize {
+    let mut left = random.uniform() * movements.iter().map(|m| m.shape.share).sum::<f64>();
     for (i, movement) in movements.iter().enumerate() {
         left -= movement.shape.share;
         if left < 0.0 {

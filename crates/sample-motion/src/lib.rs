@@ -17,7 +17,6 @@
 mod action;
 mod basis;
 mod body;
-mod chance;
 mod components;
 mod draw;
 mod error;
@@ -30,6 +29,7 @@ mod jumps;
 mod learn;
 mod movement;
 mod punches;
+mod random;
 mod segment;
 mod signal;
 

@@ -39,7 +39,7 @@ pub use particles::Search;
 pub use parzen_term::Parzen;
 pub use predict::{blended, predicted};
 pub use prediction_term::PoseSpace;
-pub use random::Chance;
+pub use random::RandomStream;
 pub use silhouette_term::SilhouetteTerm;
 pub use tracker::{Stage, Tracked, Tracker};
 pub use training_poses::built_in_poses;

@@ -11,7 +11,7 @@ use vision::Topology;
 
 use crate::{
     Annealing, ObservedFrame, ParticleOptions, Parzen, PoseSpace, SilhouetteTerm, joint_limit_energy,
-    random::Chance,
+    random::RandomStream,
 };
 
 /// Growth of β: (k + 1)^this, beside 1 / (mean − least energy of the first particles).
@@ -86,16 +86,16 @@ impl Space<'_> {
         if particle == 0 {
             return;
         }
-        let mut chance = Chance::new(self.options.seed, self.frame.index, 0, particle);
-        let share = if particle == 1 { 1.0 } else { chance.uniform() };
-        let from = chance.uniform() * self.training_poses.len() as f64;
+        let mut random = RandomStream::new(self.options.seed, self.frame.index, 0, particle);
+        let share = if particle == 1 { 1.0 } else { random.uniform() };
+        let from = random.uniform() * self.training_poses.len() as f64;
         let is_trained = self.options.with_prior && particle % FROM_TRAINING == 2;
         for &d in self.dofs {
             pose[d] += share * (self.predicted[d] - self.start[d]);
             if particle == 1 {
                 continue;
             }
-            let noise = self.spread(d) * chance.normal();
+            let noise = self.spread(d) * random.normal();
             match self.training_poses.get(from as usize) {
                 Some(training) if is_trained && d >= ROOT_DOFS => pose[d] = training[d],
                 _ => pose[d] += noise,
@@ -222,12 +222,12 @@ impl Particles {
         let mut step = DVector::zeros(space.dofs.len());
         self.chosen.resize(self.poses.len(), 0.0);
         for (particle, pose) in self.chosen.chunks_exact_mut(dofs).enumerate() {
-            let mut chance = Chance::new(options.seed, space.frame.index, iteration, particle);
+            let mut random = RandomStream::new(options.seed, space.frame.index, iteration, particle);
             let stays = options.annealing == Annealing::Interacting
-                && chance.uniform() * largest < self.weights[particle];
-            let from = if stays { particle } else { drawn(&self.weights, chance.uniform()) };
+                && random.uniform() * largest < self.weights[particle];
+            let from = if stays { particle } else { drawn(&self.weights, random.uniform()) };
             pose.copy_from_slice(&self.poses[from * dofs..(from + 1) * dofs]);
-            normals.iter_mut().for_each(|x| *x = chance.normal());
+            normals.iter_mut().for_each(|x| *x = random.normal());
             noise.mul_to(&normals, &mut step);
             space.dofs.iter().zip(step.iter()).for_each(|(&d, step)| pose[d] += step);
         }

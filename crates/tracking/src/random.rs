@@ -4,9 +4,9 @@ use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 /// Random numbers of one particle in one iteration of one frame: the same whatever thread asks.
-pub struct Chance(ChaCha8Rng);
+pub struct RandomStream(ChaCha8Rng);
 
-impl Chance {
+impl RandomStream {
     /// The stream of (seed, frame, iteration, particle).
     pub fn new(seed: u64, frame: usize, iteration: usize, particle: usize) -> Self {
         let mut key = [0; 32];
@@ -37,7 +37,7 @@ mod tests {
     #[test]
     fn streams_differ_in_each_of_their_four_numbers() {
         let first =
-            |seed, frame, iteration, particle| Chance::new(seed, frame, iteration, particle).uniform();
+            |seed, frame, iteration, particle| RandomStream::new(seed, frame, iteration, particle).uniform();
         let all =
             [first(1, 2, 3, 4), first(2, 2, 3, 4), first(1, 3, 3, 4), first(1, 2, 4, 4), first(1, 2, 3, 5)];
         for (i, a) in all.iter().enumerate() {
@@ -48,8 +48,8 @@ mod tests {
 
     #[test]
     fn normal_numbers_have_mean_0_and_variance_1() {
-        let mut chance = Chance::new(5, 0, 0, 0);
-        let numbers: Vec<f64> = (0..20_000).map(|_| chance.normal()).collect();
+        let mut random = RandomStream::new(5, 0, 0, 0);
+        let numbers: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
         let mean = numbers.iter().sum::<f64>() / 20_000.0;
         let variance = numbers.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 20_000.0;
         assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04, "{mean} {variance}");

@@ -1,7 +1,7 @@
 use body::{BodyModel, Posed, Shape};
 use model::Mesh;
 use nalgebra::Vector3;
-use tracking::{Chance, Error, ObservedFrame, Result};
+use tracking::{RandomStream, Error, ObservedFrame, Result};
 use vision::scene::{SilhouetteNoise, silhouettes};
 
 use super::Setting;
@@ -32,8 +32,8 @@ impl Start {
         }
         // over the origin, where the cameras look
         (truth[0], truth[2]) = (0.0, 0.0);
-        let mut chance = Chance::new(seed, index, 0, SHAPE);
-        let alpha: Vec<f64> = (0..model.num_components()).map(|_| 2.0 * chance.uniform() - 1.0).collect();
+        let mut random = RandomStream::new(seed, index, 0, SHAPE);
+        let alpha: Vec<f64> = (0..model.num_components()).map(|_| 2.0 * random.uniform() - 1.0).collect();
         let shape = model.shape(&alpha);
         let mut posed = Posed::default();
         shape.pose(model, &truth, &mut posed);
@@ -47,7 +47,7 @@ impl Start {
         }
         let views: Vec<_> = cameras.iter().cloned().zip(seen).collect();
         let frame = ObservedFrame::new(index, &views)?;
-        let disturbed = disturbed(setting, &truth, &mut Chance::new(seed, index, 0, TURNS));
+        let disturbed = disturbed(setting, &truth, &mut RandomStream::new(seed, index, 0, TURNS));
         Ok(Self { alpha, shape, joints, frame, disturbed })
     }
 
@@ -60,10 +60,10 @@ impl Start {
 }
 
 /// Every angle of the limbs turned one way or the other; the other way where limits leave more room there.
-fn disturbed(setting: &Setting<'_>, truth: &[f64], chance: &mut Chance) -> Vec<f64> {
+fn disturbed(setting: &Setting<'_>, truth: &[f64], random: &mut RandomStream) -> Vec<f64> {
     let mut pose = truth.to_vec();
     for dof in setting.limbs.dofs(setting.model) {
-        let turn = if chance.uniform() < 0.5 { -setting.turned_rad } else { setting.turned_rad };
+        let turn = if random.uniform() < 0.5 { -setting.turned_rad } else { setting.turned_rad };
         let within = |angle: f64| {
             let limits = setting.model.rig().dofs()[dof].limits;
             limits.map_or(angle, |[low, high]| angle.clamp(low, high))

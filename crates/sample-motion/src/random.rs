@@ -13,9 +13,9 @@ pub(crate) enum Purpose {
 }
 
 /// A reproducible stream of random numbers (ChaCha with 8 rounds).
-pub(crate) struct Chance(ChaCha8Rng);
+pub(crate) struct RandomStream(ChaCha8Rng);
 
-impl Chance {
+impl RandomStream {
     pub fn new(purpose: Purpose, numbers: [u64; 3]) -> Self {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&(purpose as u64).to_le_bytes());
