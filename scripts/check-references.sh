@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# References that code and documents make must lead somewhere: every docs/NAME.md and every docs/NAME.md#section that is named
-# exists, and nothing refers to documents or numberings that are not in the repository. With --self-test it first shows
+# References that code and documents make must lead somewhere: every docs/NAME.md, every docs/NAME.md#section and every
+# `crates/…` or `services/…` path that is named exists, and nothing refers to documents or numberings that are not in the repository. With --self-test it first shows
 # that it finds what it looks for.
 set -euo pipefail
 shopt -s inherit_errexit
@@ -32,6 +32,15 @@ broken() {
     done
 }
 
+# Prints `FILE:LINE:PATH` of each path of code in backticks that does not exist.
+missing() {
+    local file line path
+    (grep -nHoE '`(crates|services|scripts|migrations|proto|deploy)/[a-zA-Z0-9_/.-]+`' "$@" || true) | tr -d '`' |
+        while IFS=: read -r file line path; do
+            [[ -e $path ]] || echo "$file:$line: $path does not exist"
+        done
+}
+
 # Prints each line of the files given that refers to what is not in the repository.
 without_document() {
     grep -nHE "$dangling" "$@" | sed 's/$/   <- refers to no document of the repository; see docs\/papers.md/' || true
@@ -44,7 +53,7 @@ self_test() {
     trap "rm -rf '$dir'" EXIT
     while IFS= read -r line; do
         printf '%s\n' "$line" >"$dir/lib.rs"
-        [[ -n $(broken "$dir/lib.rs")$(without_document "$dir/lib.rs") ]] ||
+        [[ -n $(broken "$dir/lib.rs")$(missing "$dir/lib.rs")$(without_document "$dir/lib.rs") ]] ||
             { echo "references self-test: did not find: $line" >&2; exit 1; }
     done <<'WRONG'
 /// see docs/no-such-page.md
@@ -53,16 +62,17 @@ self_test() {
 /// A Parzen density (MM eq. 15)
 /// (LR eq. 4-10)
 /// LR-zh, table 1
+/// see `crates/no-such-crate/src/lib.rs`
 WRONG
-    printf '/// (docs/papers.md#local-regression, eq. 10; docs/papers.md)\n' >"$dir/lib.rs"
-    [[ -z $(broken "$dir/lib.rs")$(without_document "$dir/lib.rs") ]] ||
+    printf '/// (docs/papers.md#local-regression, eq. 10; docs/papers.md; `crates/model`)\n' >"$dir/lib.rs"
+    [[ -z $(broken "$dir/lib.rs")$(missing "$dir/lib.rs")$(without_document "$dir/lib.rs") ]] ||
         { echo "references self-test: found something in a right reference" >&2; exit 1; }
 }
 
 [[ ${1:-} == --self-test ]] && self_test
 
 mapfile -t files < <(git ls-files '*.rs' '*.md' '*.proto' '*.sql' '*.toml' '*.sh' ':!scripts/check-references.sh')
-found=$(broken "${files[@]}"; without_document "${files[@]}")
+found=$(broken "${files[@]}"; missing "${files[@]}"; without_document "${files[@]}")
 if [[ -n $found ]]; then
     printf '%s\n' "$found" >&2
     exit 1

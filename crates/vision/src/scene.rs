@@ -108,13 +108,13 @@ impl Default for SilhouetteNoise {
 impl SilhouetteNoise {
     /// Adds the noise to a silhouette; the same seed and view give the same noise.
     pub fn add_to(&self, silhouette: &mut Silhouette, seed: u64, view: u64) {
-        let mut chance = Chance::new(seed, view);
+        let mut random = RandomStream::new(seed, view);
         if let Some(bounds) = silhouette.bounds() {
-            self.add_discs(silhouette, bounds, &mut chance);
+            self.add_discs(silhouette, bounds, &mut random);
         }
         for y in 0..silhouette.height() {
             for x in 0..silhouette.width() {
-                if chance.uniform() < self.flipped {
+                if random.uniform() < self.flipped {
                     let is_person = silhouette.contains(x as isize, y as isize);
                     silhouette.set(x, y, !is_person);
                 }
@@ -122,24 +122,24 @@ impl SilhouetteNoise {
         }
     }
 
-    fn add_discs(&self, silhouette: &mut Silhouette, bounds: [usize; 4], chance: &mut Chance) {
+    fn add_discs(&self, silhouette: &mut Silhouette, bounds: [usize; 4], random: &mut RandomStream) {
         let [left, top, right, bottom] = bounds.map(|side| side as f64);
         let (height, margin) = (bottom - top, 0.1 * (bottom - top));
         let person = silhouette.clone();
         for index in 0..self.blobs + self.holes {
             let is_blob = index < self.blobs;
             let centre = if is_blob {
-                let x = chance.between(left - margin, right + margin);
-                Vector2::new(x, chance.between(top - margin, bottom + margin))
+                let x = random.between(left - margin, right + margin);
+                Vector2::new(x, random.between(top - margin, bottom + margin))
             } else {
                 loop {
-                    let (x, y) = (chance.between(left, right), chance.between(top, bottom));
+                    let (x, y) = (random.between(left, right), random.between(top, bottom));
                     if person.contains(x as isize, y as isize) {
                         break Vector2::new(x.floor(), y.floor());
                     }
                 }
             };
-            let radius = chance.between(self.radii[0], self.radii[1]) * height;
+            let radius = random.between(self.radii[0], self.radii[1]) * height;
             let rows = (centre.y - radius).max(0.0) as usize..=(centre.y + radius).max(0.0) as usize;
             for y in rows {
                 for x in (centre.x - radius).max(0.0) as usize..=(centre.x + radius).max(0.0) as usize {
@@ -153,9 +153,9 @@ impl SilhouetteNoise {
 }
 
 /// The random numbers of one view.
-struct Chance(ChaCha8Rng);
+struct RandomStream(ChaCha8Rng);
 
-impl Chance {
+impl RandomStream {
     fn new(seed: u64, view: u64) -> Self {
         let mut bytes = [0; 32];
         bytes[..8].copy_from_slice(&seed.to_le_bytes());

@@ -1,7 +1,7 @@
 use body::{BodyModel, Posed, Shape};
 use model::Mesh;
 use nalgebra::Vector3;
-use tracking::{RandomStream, Error, ObservedFrame, Result};
+use tracking::{Error, ObservedFrame, RandomStream, Result};
 use vision::scene::{SilhouetteNoise, silhouettes};
 
 use super::Setting;
