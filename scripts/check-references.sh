@@ -35,7 +35,7 @@ broken() {
 # Prints `FILE:LINE:PATH` of each path of code in backticks that does not exist.
 missing() {
     local file line path
-    (grep -nHoE '`(crates|services|scripts|migrations|proto|deploy)/[a-zA-Z0-9_/.-]+`' "$@" || true) | tr -d '`' |
+    (grep -nHoE '`(crates|services|scripts|migrations|proto|deploy)/[a-z0-9_/.-]+`' "$@" || true) | tr -d '`' |
         while IFS=: read -r file line path; do
             [[ -e $path ]] || echo "$file:$line: $path does not exist"
         done

@@ -85,7 +85,7 @@ fn undisturbed(stack: &Stack, api: &Api) -> Result<&'static (String, Files)> {
     let session = session_of(api, &walk(101, CHUNK_FRAMES * NUM_CHUNKS)?)?;
     let run = start_run(api, &session)?;
     succeed(api, &run)?;
-    let chunks = Chunks::of(api, &run)?;
+    let chunks = Chunks::from_run(api, &run)?;
     ensure!(chunks.count == NUM_CHUNKS as u64 && chunks.workers.len() == 1, "one replica, but {chunks:?}");
     let files = api.motion_files(&run)?;
     ensure!(!files.is_empty(), "{run} has no results");
@@ -132,7 +132,7 @@ fn three_replicas_share_one_run_and_change_no_bit_of_it() -> Result<()> {
     stack.scale("reconstruction", 3)?;
     let run = start_run(api, session)?;
     succeed(api, &run)?;
-    let chunks = Chunks::of(api, &run)?;
+    let chunks = Chunks::from_run(api, &run)?;
     ensure!(chunks.workers.len() >= 2, "one replica did everything: {chunks:?}");
     ensure_same(&api.motion_files(&run)?, expected)
 }
@@ -147,7 +147,7 @@ fn a_replica_killed_in_the_middle_of_a_run_costs_nothing() -> Result<()> {
     let run = start_run(api, session)?;
     let killed = kill_a_busy_replica(stack, api, &run)?;
     succeed(api, &run)?;
-    let chunks = Chunks::of(api, &run)?;
+    let chunks = Chunks::from_run(api, &run)?;
     ensure!(chunks.attempts > chunks.count, "{killed} was killed, but no chunk begun again: {chunks:?}");
     ensure_same(&api.motion_files(&run)?, expected)
 }
@@ -157,10 +157,10 @@ fn a_replica_killed_in_the_middle_of_a_run_costs_nothing() -> Result<()> {
 fn kill_a_busy_replica(stack: &Stack, api: &Api, run: &str) -> Result<String> {
     let begin = Instant::now();
     while begin.elapsed() < LONGEST_RUN {
-        for worker in Chunks::of(api, run)?.running_on {
+        for worker in Chunks::from_run(api, run)?.running_on {
             let container = stack::container_of(&worker)?;
             stack.docker(&["pause", &container])?;
-            if Chunks::of(api, run)?.running_on.contains(&worker) {
+            if Chunks::from_run(api, run)?.running_on.contains(&worker) {
                 stack.docker(&["kill", "--signal", "KILL", &container])?;
                 return Ok(worker);
             }
@@ -183,7 +183,7 @@ struct Chunks {
 }
 
 impl Chunks {
-    fn of(api: &Api, run: &str) -> Result<Self> {
+    fn from_run(api: &Api, run: &str) -> Result<Self> {
         let shown = api.get(run)?.json();
         let jobs = shown["jobs"].as_array().with_context(|| format!("no jobs in {shown}"))?;
         let mut chunks = Self::default();

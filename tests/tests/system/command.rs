@@ -90,12 +90,12 @@ impl Drop for Up {
 
 /// Processes whose command line mentions `text`.
 fn processes(text: &str) -> Vec<String> {
-    let of = |entry: fs::DirEntry| {
+    let matching_line = |entry: fs::DirEntry| {
         let bytes = fs::read(entry.path().join("cmdline")).ok()?;
         let line = String::from_utf8_lossy(&bytes).replace('\0', " ");
         line.contains(text).then_some(line)
     };
-    fs::read_dir("/proc").into_iter().flatten().flatten().filter_map(of).collect()
+    fs::read_dir("/proc").into_iter().flatten().flatten().filter_map(matching_line).collect()
 }
 
 #[test]
