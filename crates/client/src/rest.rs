@@ -113,7 +113,6 @@ pub struct Page<T> {
 
 #[derive(Deserialize)]
 struct Problem {
-    title: String,
     detail: String,
 }
 
@@ -203,7 +202,7 @@ impl Client {
         }
         let found = hasher.finalize().to_hex();
         if found.as_str() != blake3 {
-            bail!("{path} came damaged: its checksum is {found}, expected {blake3}");
+            bail!("{path} arrived damaged: its checksum is {found}, expected {blake3}");
         }
         part.persist(to).with_context(|| to.display().to_string())?;
         Ok(())
@@ -281,8 +280,7 @@ impl Client {
         let status = response.status();
         let text = response.body_mut().read_to_string().unwrap_or_default();
         match serde_json::from_str::<Problem>(&text) {
-            Ok(problem) if problem.detail == problem.title => bail!("{}", problem.detail),
-            Ok(problem) => bail!("{}: {}", problem.title, problem.detail),
+            Ok(problem) => bail!("{}", problem.detail),
             Err(_) => bail!("{path}: the server answered {status}"),
         }
     }

@@ -5,3 +5,4 @@
 pub mod bench;
 pub mod evaluate;
 mod motions;
+mod progress;

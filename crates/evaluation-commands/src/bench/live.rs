@@ -32,8 +32,8 @@ const START_WAIT: Duration = Duration::from_secs(60);
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey bench live --streams 8 --seconds 20
-  marey bench live --train cmu/ --test held-out/ --streams 8 --fps 60 --seconds 60 --json live.json
-  marey bench live --database walks --test held-out/")]
+  marey bench live --train recordings/ --test more/ --streams 4 --seconds 10 --json live.json
+  marey bench live --database walks --test more/ --streams 2 --seconds 10")]
 pub struct Args {
     /// Performers at once
     #[arg(long, default_value_t = 8)]

@@ -41,8 +41,8 @@ rest    the pose back in the world, its standard deviations, bookkeeping
 start   candidates sought over the whole database and run over the first frames
 
 Examples:
-  marey bench reconstruct --train five-actions/ --query five-actions/
-  marey bench reconstruct --train cmu/ --query held-out/ --windows 2 --trials 20 --json speed.json")]
+  marey bench reconstruct --train recordings/ --query recordings/
+  marey bench reconstruct --train recordings/ --query more/ --windows 2 --json speed.json")]
 pub struct Args {
     /// Folders of motion for the database: ASF+AMC or BVH, also .zst
     #[arg(long, required = true, num_args = 1.., value_name = "DIR")]

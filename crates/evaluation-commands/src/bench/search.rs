@@ -29,8 +29,8 @@ fast, tracking    from the last frame's matches along the neighbour graph
 recall            share of the exact search's windows that were found
 
 Examples:
-  marey bench search --train cmu/ --query cmu/07 cmu/35 cmu/49 cmu/91
-  marey bench search --train cmu/ --query cmu/07 cmu/35 cmu/49 cmu/91 --augment mirror,warp --json search.json")]
+  marey bench search --train recordings/ --query more/
+  marey bench search --train recordings/ --query more/ --augment mirror,warp --json search.json")]
 pub struct Args {
     /// Folders of motion for the database: ASF+AMC or BVH, also .zst
     #[arg(long, required = true, num_args = 1.., value_name = "DIR")]

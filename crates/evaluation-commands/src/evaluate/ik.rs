@@ -5,7 +5,6 @@ use std::{path::PathBuf, time::Instant};
 use anyhow::{Context, bail};
 use body::{BodyModel, Shape};
 use evaluation::limbs::{LimbErrors, Limbs, Method, Still, run_all};
-use indicatif::{ProgressBar, ProgressStyle};
 use inverse_kinematics::Recording;
 use model::{Motion, Silhouette};
 use motion_db::Clip;
@@ -14,7 +13,7 @@ use serde::Serialize;
 use vision::scene::SilhouetteNoise;
 
 use super::written::write;
-use crate::motions;
+use crate::{motions, progress::Progress};
 
 /// `marey evaluate ik`
 #[derive(Debug, clap::Args)]
@@ -22,11 +21,12 @@ use crate::motions;
 Motion drives the body model, which is drawn into two cameras. Arms of boxers and legs of walkers are told where their \
 shoulders and wrists, or hips and ankles, are, and the silhouettes; the elbows and knees found are compared with the true ones.
 
-  marey evaluate ik --data five-actions/ --json errors.json
-  marey evaluate ik --boxing 14_02.amc --walking 05_01.amc 16_17.amc
+Motion must be on the CMU skeleton, ASF+AMC or BVH, also .zst; the skeleton of an AMC file is looked for beside it. Without any, \
+motion is drawn from the sample motion that comes with Marey: it is synthetic.
 
-Motion is of the CMU skeleton, ASF+AMC or BVH, also .zst; the skeleton of an AMC file is looked for beside it. Without any, \
-motion is drawn from the sample motion that comes with Marey: it is synthetic.")]
+Examples:
+  marey evaluate ik --frames 20
+  marey evaluate ik --data recordings/ --frames 20 --json errors.json")]
 pub struct Args {
     /// Motion files of people who box
     #[arg(long, num_args = 1.., value_name = "FILE")]
@@ -142,9 +142,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             recordings.push((recording, test.limbs));
         }
         let frames = recordings.iter().map(|(recording, _)| recording.poses.len()).sum();
-        let bar = progress(test.action, frames)?;
+        // of two cameras, exact and noisy
+        let bar = Progress::new(4 * frames, "silhouettes")?;
+        bar.note(test.action.to_owned());
         let shown = |silhouette: Silhouette, _, _| {
-            bar.inc(1);
+            bar.inc();
             silhouette
         };
         let exact = run_all(&model, &shape, &recordings, Method::all, &shown)?;
@@ -152,7 +154,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let with_noise = |silhouette, frame, camera| noisy(shown(silhouette, frame, camera), frame, camera);
         let noisy = run_all(&model, &shape, &recordings, Method::all, &with_noise)?;
         rows.extend(rows_of(&test, "noisy", &noisy));
-        bar.finish_and_clear();
+        bar.finish();
         if let (true, Some(pose)) = (speed.is_empty(), recordings.iter().find_map(|(r, _)| r.poses.first())) {
             speed = speeds(&model, &shape, pose, test.limbs)?;
         }
@@ -194,13 +196,6 @@ fn sample(limbs: Limbs, frames: usize) -> anyhow::Result<Vec<(String, Motion)>> 
         Ok((format!("sample {subject}"), Model::bundled().draw(action, subject, &options(subject))?))
     };
     (1..=4).map(draw).collect()
-}
-
-/// A bar that counts silhouettes: of two cameras, exact and noisy.
-fn progress(action: &str, frames: usize) -> anyhow::Result<ProgressBar> {
-    let style =
-        ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} silhouettes  {elapsed} (~{eta} left)")?;
-    Ok(ProgressBar::new(4 * frames as u64).with_style(style).with_message(action.to_owned()))
 }
 
 fn noisy(mut seen: Silhouette, frame: usize, camera: usize) -> Silhouette {

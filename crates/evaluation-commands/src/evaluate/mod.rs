@@ -7,6 +7,7 @@ mod multiview;
 mod overlay;
 mod recovery;
 mod run_command;
+mod run_joints;
 mod shape;
 mod sparse_command;
 mod sweep;

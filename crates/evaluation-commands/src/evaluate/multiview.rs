@@ -14,7 +14,6 @@ use std::{
 use anyhow::{Context, bail};
 use body::BodyModel;
 use evaluation::training_poses::training_poses;
-use indicatif::{ProgressBar, ProgressStyle};
 use model::{Camera, Silhouette};
 use motion_db::Clip;
 use nalgebra::Vector3;
@@ -23,7 +22,7 @@ use tracking::{ObservedFrame, Options, Part, ParticleOptions, Tracked, Tracker, 
 use vision::scene::SilhouetteNoise;
 
 use super::{capture::Folder, recovery, shape, written::write};
-use crate::motions;
+use crate::{motions, progress::Progress};
 use film::Film;
 use joints::{JointErrors, Joints};
 use report::{FrameReport, Report, Settings, Times};
@@ -36,12 +35,13 @@ DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png an
 there are any, show points of the person that are found again, and are the ground of the overlays. The body's shape and its first pose are found in the first frame, without a start given; \
 then it is followed from frame to frame.
 
-  marey evaluate multiview captures/man/ --json errors.json
-  marey evaluate multiview captures/man/ --cameras 0,2,4,6 --noise --overlay films/
-  marey evaluate multiview captures/man/ --prior-from recordings/
-
 Joints are compared by name. Beside the result stand two that need less: local optimisation without particles, and the first pose kept \
-for all frames.")]
+for all frames.
+
+Examples:
+  marey evaluate multiview capture/ --json errors.json
+  marey evaluate multiview capture/ --cameras 0,2,4 --noise --overlay films/
+  marey evaluate multiview capture/ --prior-from recordings/")]
 pub struct Args {
     /// Folder of a capture: calibration, silhouettes and true joints
     #[arg(value_name = "DIR")]
@@ -92,10 +92,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     };
     let training = prior(&model, &args.prior_from)?;
     let joints = Joints::new(&model, &folder.joints(first)?)?;
-    let bar = ProgressBar::new(frames.len() as u64)
-        .with_style(ProgressStyle::with_template("{bar:30} {pos}/{len} frames  {msg}  {eta} left")?)
-        .with_message("looking for the body");
-    bar.tick();
+    let bar = Progress::new(frames.len(), "frames")?;
+    bar.note("looking for the body".to_owned());
     let started = Instant::now();
     let found = fit(&model, &seen(&folder, first, args.noise)?, &shape_fit::Options::default());
     let found: Fit = found.with_context(|| format!("frame {first} of {}", args.folder.display()))?;
@@ -117,14 +115,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let (tracked, mut report) = run.frame(&observed, &joints, &truth)?;
         (report.frame, report.prepare_ms) = (number, prepare_ms);
         report.kept = joints.compare(&found.joints, &truth);
-        bar.set_message(format!("{:.0} mm", report.errors.mean_mm));
+        bar.note(format!("{:.0} mm", report.errors.mean_mm));
         if let Some(film) = &mut film {
             film.add(&folder, number, &views, &tracked)?;
         }
         reports.push(report);
-        bar.inc(1);
+        bar.inc();
     }
-    bar.finish_and_clear();
+    bar.finish();
     if let Some(film) = film {
         film.finish()?;
     }

@@ -8,11 +8,11 @@ use std::path::PathBuf;
 use body::BodyModel;
 use clap::ValueEnum;
 use evaluation::recovery::{Limbs, Method, Setting, recover};
-use indicatif::{ProgressBar, ProgressStyle};
 use tracking::built_in_poses;
 use vision::scene::Ring;
 
 use super::written::write;
+use crate::progress::Progress;
 use poses::{Part, Poses};
 pub(super) use poses::{TRAINING_POSES, poses};
 use report::{Cell, Json};
@@ -28,12 +28,13 @@ Bodies are drawn in poses of recorded people, as a ring of cameras would see the
 angle, and every way to find the pose again starts from there: local optimisation alone, one particle search over the turned limbs \
 with and without the prior, and all that Marey does in a frame. Found means that all joints are within 50 mm of the truth.
 
-  marey evaluate recovery --motion recordings/
-  marey evaluate recovery --motion recordings/ --turned 60,90 --limbs arms,all --noise --json recovery.json
-
 Poses are chosen to be as different as possible. Bodies have the poses of a third of the performers, the prior is made of the poses \
 of another third (about a hundred); the last third is there to try settings on (--part tune). Without --motion, bodies have poses of \
-synthetic motion and the prior is the built-in one.")]
+synthetic motion and the prior is the built-in one.
+
+Examples:
+  marey evaluate recovery --limbs leg --turned 40 --starts 5
+  marey evaluate recovery --motion recordings/ --limbs arm --turned 60 --starts 5 --json recovery.json")]
 pub struct Args {
     /// Folders of recordings: ASF+AMC of the CMU skeleton, also .zst or .gz [default: synthetic motion]
     #[arg(long, num_args = 1.., value_name = "DIR")]
@@ -106,8 +107,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let noise = if args.noise { "noisy" } else { "exact" };
     eprintln!("{note}; {} cameras, {noise} silhouettes", cameras.len());
     let cells = args.limbs.len() * args.turned.len();
-    let bar = ProgressBar::new((cells * drawn.len()) as u64)
-        .with_style(ProgressStyle::with_template("{bar:30} {pos}/{len} starts  {eta} left")?);
+    let bar = Progress::new(cells * drawn.len(), "starts")?;
     let mut found = Vec::new();
     for limbs in &args.limbs {
         for &degrees in &args.turned {
@@ -121,11 +121,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
                 turned_rad: degrees.to_radians(),
                 seed: args.seed,
             };
-            let recovered = recover(&setting, &methods, &|| bar.inc(1))?;
+            let recovered = recover(&setting, &methods, &|| bar.inc())?;
             found.push(Cell::new(name, degrees, &methods, recovered));
         }
     }
-    bar.finish_and_clear();
+    bar.finish();
     let table = report::table(&found, format!("{note}; {} cameras, {noise} silhouettes", cameras.len()));
     println!("{}\n{}\n\n{}", table.title, table.note, table.text().trim_end());
     report::print_claim(&found);

@@ -8,7 +8,7 @@ use evaluation::{
     Comparison, ContactThresholds, FootPaths, FootSlide, at_60_hz, compare_in_detail, foot_slide,
     report::{About, run_errors, run_report},
 };
-use formats::{BvhOptions, FileRole, session};
+use formats::{BvhOptions, FileRole, points_csv, session};
 use kinematics::{Parametrisation, References};
 use model::Motion;
 use reconstruction::{NamedBytes, Truth, truth_of};
@@ -16,7 +16,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::written::{command, write};
+use super::{
+    run_joints,
+    written::{command, write},
+};
 
 /// Most bytes of an unpacked file.
 const MAX_BYTES: u64 = 2 << 30;
@@ -24,15 +27,19 @@ const MAX_BYTES: u64 = 2 << 30;
 /// `marey evaluate run`
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-The truth is the session's file of role ground-truth (an AMC on the session's skeleton, or a BVH), also when it was uploaded after the run:
+The truth is the session's file of role ground-truth (an AMC on the session's skeleton, or a BVH), also when it was uploaded after the \
+run. Runs on cameras and by inverse kinematics have a body of their own: their joints are compared, by name, with true ones.
 
+Examples:
   marey upload \"take 3\" truth.amc
-  marey evaluate run RUN --html report.html
-  marey evaluate run RUN --truth truth.amc")]
+  marey evaluate run \"take 3\" --html report.html
+  marey evaluate run \"take 3\" --truth truth.amc
+  marey evaluate run \"synthetic walk\" --truth capture/groundtruth/joints.json")]
 pub struct Args {
-    /// The run's id
+    /// The run: its id, or the name of a session, whose newest run is meant
     run: String,
-    /// The true motion: AMC or BVH, also .zst [default: the session's ground-truth file]
+    /// The true motion: AMC or BVH, also .zst; true joints for a run on cameras: .json, .csv, .trc or .c3d [default: the
+    /// session's ground-truth file]
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
     /// Write a report to this file: one page with tables and plots, to be opened in a browser
@@ -75,14 +82,16 @@ struct Json<'a> {
 /// Runs `marey evaluate run`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
-    let run: Run = client.get(&format!("/v1/runs/{}", encode(&args.run)))?;
-    if run.kind != "reconstruction" {
-        bail!("run {} is of kind {}: there is no motion to compare", run.id, run.kind);
-    }
+    let run: Run = client.get(&format!("/v1/runs/{}", client.find_run(&args.run)?))?;
     if run.state != "succeeded" {
         bail!("run {} is {}, expected succeeded; see `marey status {}`", run.id, run.state, run.id);
     }
     let downloads = Downloads { client: &client, folder: tempfile::tempdir()? };
+    match run.kind.as_str() {
+        "reconstruction" => {}
+        "multi-view" | "inverse-kinematics" => return joints(args, &downloads, &run),
+        kind => bail!("run {} is of kind {kind}: it makes no motion", run.id),
+    }
     let session = run.session_id.as_deref().context("the run's session is not there any more")?;
     let files = inputs(args, &downloads, session)?;
     let Some(name) = files.iter().find(|f| f.role == FileRole::GroundTruth).map(|f| f.name.clone()) else {
@@ -132,6 +141,35 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The joints of a run that has a body of its own, beside true ones.
+fn joints(args: &Args, downloads: &Downloads<'_>, run: &Run) -> anyhow::Result<()> {
+    let Some(path) = &args.truth else {
+        bail!(
+            "run {} is of kind {}: name the true joints, --truth FILE (.json of `marey sample-capture`, .csv, .trc or .c3d)",
+            run.id,
+            run.kind
+        );
+    };
+    if args.html.is_some() {
+        bail!("--html is for runs from control points; run {} is of kind {}", run.id, run.kind);
+    }
+    let truth = run_joints::read_truth(path)?;
+    let found = points_csv::read(&downloads.result(&run.id, "joints.csv")?)?.value;
+    let first = run.parameters["parameters"]["first_frame"].as_u64().unwrap_or(0) as usize;
+    let report = run_joints::compare(&found, &truth, first)?;
+    println!(
+        "run {} beside {}, {} frames\n{}",
+        run.id,
+        path.display(),
+        report.frames,
+        report.text().trim_end()
+    );
+    if let Some(path) = &args.json {
+        write(path, serde_json::to_vec_pretty(&report)?)?;
+    }
+    Ok(())
+}
+
 /// The files that tell the truth: the session's skeleton, and its ground truth or the file given.
 fn inputs(args: &Args, downloads: &Downloads<'_>, session: &str) -> anyhow::Result<Vec<NamedBytes>> {
     let session = format!("/v1/sessions/{}/files", encode(session));
@@ -170,15 +208,18 @@ impl Downloads<'_> {
         Ok(fs::read(to)?)
     }
 
-    /// A run's motion: as BVH beside a BVH, whose joints have that file's channels; else as AMC with its skeleton.
-    fn motion(&self, run: &str, as_bvh: bool) -> anyhow::Result<Motion> {
+    /// A result of a run.
+    fn result(&self, run: &str, name: &str) -> anyhow::Result<Vec<u8>> {
         let results = format!("/v1/runs/{}/results", encode(run));
         let listed: Vec<ResultFile> = self.client.get(&results)?;
-        let file = |name: &str| {
-            let found = listed.iter().find(|file| file.name == name);
-            let found = found.with_context(|| format!("run {run} has no result {name}"))?;
-            self.get(&format!("{results}/{name}"), &found.blake3)
-        };
+        let found = listed.iter().find(|file| file.name == name);
+        let found = found.with_context(|| format!("run {run} has no result {name}"))?;
+        self.get(&format!("{results}/{name}"), &found.blake3)
+    }
+
+    /// A run's motion: as BVH beside a BVH, whose joints have that file's channels; else as AMC with its skeleton.
+    fn motion(&self, run: &str, as_bvh: bool) -> anyhow::Result<Motion> {
+        let file = |name: &str| self.result(run, name);
         if as_bvh {
             return Ok(formats::bvh::read(&file("motion.bvh")?, &BvhOptions::default())?.value);
         }

@@ -30,12 +30,13 @@ use super::{
 DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png, groundtruth/mesh_0000.ply and groundtruth/joints.json; \
 images/CAMERA/0000.jpg, where there are any, are the ground of the overlays.
 
-  marey evaluate shape captures/man/ --cameras 0,2,4,6 --json errors.json
-  marey evaluate shape captures/man/ --noise 7 --overlay overlays/
-  marey evaluate shape --scans bodies/ --leave-one-out 20 --json errors.json
-
 With --scans, people whose registered scans are known are drawn as 8 cameras would see them, and found again by a model that was \
-learned without them: in the base pose and in 5 others.")]
+learned without them: in the base pose and in 5 others.
+
+Examples:
+  marey evaluate shape capture/ --cameras 0,2,4 --json errors.json
+  marey evaluate shape capture/ --noise 7 --overlay overlays/
+  marey evaluate shape --scans scans/ --leave-one-out 20 --json errors.json")]
 pub struct Args {
     /// Folder of a capture: calibration, silhouettes, true mesh and joints
     #[arg(value_name = "DIR", required_unless_present = "scans", conflicts_with = "scans")]

@@ -3,14 +3,13 @@ use std::{num::NonZeroUsize, path::PathBuf, time::Instant};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 use evaluation::{Protocol, SparseEvaluation, evaluate_sparse, shuffle_by_name, summarise};
-use indicatif::{ProgressBar, ProgressStyle};
 use motion_db::{Augment, Clip};
 
 use super::{
     sweep::SweepArgs,
     written::{Outcome, Written},
 };
-use crate::motions;
+use crate::{motions, progress::Progress};
 
 /// Every n-th trial, in the order of names, is for tuning; the others are for reporting.
 const TUNING_STEP: usize = 3;
@@ -20,14 +19,15 @@ const TUNING_STEP: usize = 3;
 #[command(after_help = "\
 The control points are taken from each trial itself; its motion is reconstructed from them and compared.
 
-  marey evaluate sparse --train walks/ --test walks/ --points 4,6 --html report.html
-  marey evaluate sparse --train cmu/ --test cmu/ --actions walk,run,jump --part report --json errors.json
-  marey evaluate sparse --train cmu/ --test cmu/ --points 6 --window 1,2,3,4 --threads 1
-  marey evaluate sparse --train cmu/ --test cmu/ --points 6 --occlusion one:0.5s,all:0.5s --compare control_sigma_m=0.003
-
 trial-out    everything but the trial itself is in the database (as in the papers)
 subject-out  nothing of the trial's performer is in the database (what a new user gets)
-trial-in     the trial itself is in the database: an upper bound, not a result")]
+trial-in     the trial itself is in the database: an upper bound, not a result
+
+Examples:
+  marey evaluate sparse --train recordings/ --test recordings/ --points 4,6 --html report.html
+  marey evaluate sparse --train recordings/ --test recordings/ --actions walk --json errors.json
+  marey evaluate sparse --train recordings/ --test recordings/ --points 6 --window 1,2,3,4
+  marey evaluate sparse --train recordings/ --test recordings/ --points 6 --occlusion one:0.5s")]
 pub struct Args {
     /// Folders of motion for the database: ASF+AMC or BVH, also .zst
     #[arg(long, required = true, num_args = 1.., value_name = "DIR")]
@@ -119,14 +119,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         max_frames: args.frames,
         threads,
     };
-    let bar = ProgressBar::new(0)
-        .with_style(ProgressStyle::with_template("{bar:30} {pos}/{len} trials  {eta} left")?);
+    let bar = Progress::new(0, "trials")?;
     let begin = Instant::now();
     let results = evaluate_sparse(&evaluation, &|| begin.elapsed().as_secs_f64(), &|done, total| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
+        bar.set(done, total);
     })?;
-    bar.finish_and_clear();
+    bar.finish();
     let rows = summarise(&results, evaluation.protocol);
     if rows.is_empty() {
         bail!("every trial is shorter than the gap with half a second before and after it");

@@ -6,7 +6,6 @@ use anyhow::{Context, bail};
 use body::{Aligned, LearnOptions, ScanOptions, ScanSet};
 use evaluation::{Body, Distribution, ShapeErrors, shape_errors};
 use formats::archive::Entry;
-use indicatif::{ProgressBar, ProgressStyle};
 use model::Mesh;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -14,9 +13,12 @@ use shape_fit::{Options, fit};
 use vision::scene::{Ring, SilhouetteNoise, silhouettes};
 
 use super::{Args, body_of};
-use crate::evaluate::{
-    capture::{bytes, list},
-    written::write,
+use crate::{
+    evaluate::{
+        capture::{bytes, list},
+        written::write,
+    },
+    progress::Progress,
 };
 
 /// What the name of the base pose contains.
@@ -90,8 +92,7 @@ pub fn run(folder: &Path, args: &Args) -> anyhow::Result<()> {
     let aligned = Aligned::new(&scans, &set.template, &options)?;
     let people = people(&meshes.rows, args.leave_one_out)?;
     let cameras = Ring::default().cameras();
-    let bar = ProgressBar::new((people.len() * POSES) as u64)
-        .with_style(ProgressStyle::with_template("{bar:30} {pos}/{len} bodies  {eta} left")?);
+    let bar = Progress::new(people.len() * POSES, "bodies")?;
     let mut cases = Vec::new();
     for person in &people {
         let own = meshes.rows.iter().filter(|row| row.subject == person.subject);
@@ -121,10 +122,10 @@ pub fn run(folder: &Path, args: &Args) -> anyhow::Result<()> {
                 failure: found.as_ref().err().map(ToString::to_string),
                 seconds,
             });
-            bar.inc(1);
+            bar.inc();
         }
     }
-    bar.finish_and_clear();
+    bar.finish();
     report(&cases, people.len(), cameras.len(), args)
 }
 
