@@ -10,7 +10,7 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
 	@printf '\nFirst time here? `make demo` sets everything up and shows what Marey does.\n'
 
-demo: ## set up, build, reconstruct real sessions end to end, say how well (DATA=dir: on your ASF/AMC files)
+demo: ## set up, build, reconstruct held-out trials and a person before cameras, say how well (DATA=dir: your trials)
 	@scripts/demo.sh $(if $(DATA),"$(DATA)")
 
 test: ## set up, then every test; those in compose too where a Docker engine answers

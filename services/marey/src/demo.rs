@@ -36,8 +36,8 @@ use crate::{
 const SERVER_FOLDER: &str = ".marey/demo";
 /// Where the results go unless told otherwise; the next demo's into the first free of -2, -3 and so on.
 const RESULTS: &str = "marey-demo";
-/// Trials that are drawn when there is no data.
-const NUM_SAMPLES: u32 = 144;
+/// Trials that are drawn when there is no data: ten of each of four actions for each of four performers.
+const NUM_SAMPLES: u32 = 160;
 
 /// Show what Marey does, on motion of its own or on yours
 ///
@@ -77,7 +77,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         println!("Starting PostgreSQL, the gateway and the four services");
         let up = up::Args { data_dir: folder.to_owned(), listen: ([127, 0, 0, 1], 0).into(), workers: None };
-        let Some(everything) = Everything::start(&up, shutdown.clone()).await? else { return Ok(()) };
+        let started = Everything::start(&up, shutdown.clone()).await?;
+        let everything = started.context("stopped before it had begun")?;
         let client = Client::new(everything.server.clone());
         let data = args.data.clone();
         let show = tokio::task::spawn_blocking(move || {
