@@ -165,26 +165,40 @@ impl FromRequestParts<App> for Caller {
     }
 }
 
+/// A caller, and what every handler shares.
+#[derive(Debug, Clone)]
+pub(crate) struct Access {
+    pub app: App,
+    pub caller: Caller,
+}
+
+impl Access {
+    async fn with(parts: &mut Parts, app: &App, scope: Scope) -> Result<Self, Error> {
+        let caller = Caller::from_request_parts(parts, app).await?.require(scope)?;
+        Ok(Self { app: app.clone(), caller })
+    }
+}
+
 /// A caller who may read.
 #[derive(Debug, Clone)]
-pub(crate) struct Reader(pub Caller);
+pub(crate) struct Reader(pub Access);
 
 impl FromRequestParts<App> for Reader {
     type Rejection = Error;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Error> {
-        Ok(Self(Caller::from_request_parts(parts, app).await?.require(Scope::Read)?))
+        Access::with(parts, app, Scope::Read).await.map(Self)
     }
 }
 
 /// A caller who may change things.
 #[derive(Debug, Clone)]
-pub(crate) struct Writer(pub Caller);
+pub(crate) struct Writer(pub Access);
 
 impl FromRequestParts<App> for Writer {
     type Rejection = Error;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Error> {
-        Ok(Self(Caller::from_request_parts(parts, app).await?.require(Scope::Write)?))
+        Access::with(parts, app, Scope::Write).await.map(Self)
     }
 }

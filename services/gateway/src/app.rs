@@ -46,7 +46,11 @@ impl App {
             },
             http_counts: Arc::default(),
             changes: Changes::default(),
-            live: Live { replicas: config.reconstruction.clone(), tasks: TaskTracker::new() },
+            live: Live {
+                replicas: config.reconstruction.clone(),
+                tasks: TaskTracker::new(),
+                shutdown: shutdown.clone(),
+            },
             shutdown,
         }
     }

@@ -24,7 +24,7 @@ pub enum Error {
         which: String,
     },
     /// There is nothing at this path.
-    #[error("there is nothing at {0}")]
+    #[error("there is nothing at {0}; /docs lists all paths")]
     NoSuchPath(String),
     /// The path is there, but not for this method.
     #[error("{0} is not a method of this path")]

@@ -9,7 +9,7 @@ use utoipa::{
     },
 };
 
-use crate::{error::Problem, routes};
+use crate::{error::Problem, runs::request::add_examples};
 
 const KEY: &str = "api_key";
 
@@ -49,12 +49,14 @@ pub(crate) fn head() -> utoipa::openapi::OpenApi {
     api
 }
 
-/// Adds what all operations share: any answer but the named ones is a problem.
+/// Adds what all operations share: any answer but the named ones is a problem; and what no
+/// macro says: examples of runs.
 pub(crate) fn finish(mut api: utoipa::openapi::OpenApi) -> utoipa::openapi::OpenApi {
     for path in api.paths.paths.values_mut() {
         let operations = [&mut path.get, &mut path.put, &mut path.post, &mut path.delete];
         for operation in operations.into_iter().filter_map(Option::as_mut) {
             add_problem(operation);
+            add_examples(operation);
         }
     }
     api
@@ -67,9 +69,4 @@ fn add_problem(operation: &mut Operation) {
         .content("application/problem+json", content)
         .build();
     operation.responses.responses.insert("default".to_owned(), RefOr::T(problem));
-}
-
-/// The OpenAPI 3.1 document, as it is served at `/openapi.json`.
-pub fn document() -> utoipa::openapi::OpenApi {
-    finish(routes::described().into_openapi())
 }

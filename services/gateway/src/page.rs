@@ -1,4 +1,4 @@
-//! Lists are paged by cursor: newest first, so many at a time, and where to go on.
+//! Lists are paged by cursor: newest first, so many at a time, and where the next part begins.
 
 use axum::Json;
 use serde::{Deserialize, Serialize};
@@ -31,12 +31,17 @@ pub(crate) trait Item: for<'r> FromRow<'r, PgRow> + Send + Unpin {
 
 impl PageQuery {
     /// The part of a list. `query`: rows of owner `$1` with an id below `$2`, newest first, at most `$3`.
-    pub async fn of<T: Item>(&self, db: &PgPool, query: &'static str, owner: Uuid) -> Result<Json<Page<T>>> {
-        self.ending_with(db, query, owner, None).await
+    pub async fn select<T: Item>(
+        &self,
+        db: &PgPool,
+        query: &'static str,
+        owner: Uuid,
+    ) -> Result<Json<Page<T>>> {
+        self.select_ending_with(db, query, owner, None).await
     }
 
     /// The same of a list that ends with one more item, older than all.
-    pub async fn ending_with<T: Item>(
+    pub async fn select_ending_with<T: Item>(
         &self,
         db: &PgPool,
         query: &'static str,

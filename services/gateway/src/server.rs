@@ -25,7 +25,7 @@ impl Gateway {
     /// Brings the database's schema up to date, and serves until `shutdown`. Returns once it listens.
     ///
     /// # Errors
-    /// If the database, the store or the address can't be had.
+    /// If the database, the store or the address can't be reached or opened.
     pub async fn start(config: &Config, shutdown: CancellationToken) -> anyhow::Result<Self> {
         let db = PgPoolOptions::new()
             .max_connections(config.max_connections)

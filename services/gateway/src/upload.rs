@@ -33,7 +33,7 @@ impl Announced {
             headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()).and_then(|v| v.parse().ok());
         let sha256 = match headers.get("content-digest") {
             None => None,
-            Some(value) => Some(value.to_str().ok().and_then(sha256_of_digest).ok_or_else(|| {
+            Some(value) => Some(value.to_str().ok().and_then(sha256_from_digest).ok_or_else(|| {
                 Error::BadRequest(
                     "Content-Digest has no readable sha-256, expected sha-256=:<base64>:".into(),
                 )
@@ -43,7 +43,7 @@ impl Announced {
     }
 }
 
-fn sha256_of_digest(header: &str) -> Option<[u8; 32]> {
+fn sha256_from_digest(header: &str) -> Option<[u8; 32]> {
     let value = header.split(',').find_map(|member| member.trim().strip_prefix("sha-256="))?;
     let base64 = value.trim().strip_prefix(':')?.strip_suffix(':')?;
     BASE64_STANDARD.decode(base64).ok()?.try_into().ok()
@@ -164,10 +164,10 @@ mod tests {
     #[test]
     fn a_content_digest_is_read_among_others() {
         let hash = BASE64_STANDARD.encode([7; 32]);
-        assert_eq!(sha256_of_digest(&format!("sha-256=:{hash}:")), Some([7; 32]));
-        assert_eq!(sha256_of_digest(&format!("md5=:AA==:, sha-256=:{hash}:")), Some([7; 32]));
+        assert_eq!(sha256_from_digest(&format!("sha-256=:{hash}:")), Some([7; 32]));
+        assert_eq!(sha256_from_digest(&format!("md5=:AA==:, sha-256=:{hash}:")), Some([7; 32]));
         for bad in ["sha-256=abc", "sha-256=:abc:", "md5=:AA==:", "", "sha-256=:AA==:"] {
-            assert_eq!(sha256_of_digest(bad), None, "{bad}");
+            assert_eq!(sha256_from_digest(bad), None, "{bad}");
         }
     }
 }

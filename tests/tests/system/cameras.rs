@@ -217,7 +217,7 @@ fn a_request_for_the_wrong_kind_of_session_is_refused() -> Result<()> {
     refused(
         &[("calib.toml", b"x"), ("cam1.mp4", b"x")],
         json!({"points": ["head"]}),
-        "points is for sessions of",
+        "points is not a field of multi-view runs",
     )?;
     refused(&[("calib.toml", b"x"), ("cam1.mp4", b"x")], json!({"background": "green"}), "green")?;
     refused(
@@ -225,11 +225,11 @@ fn a_request_for_the_wrong_kind_of_session_is_refused() -> Result<()> {
         json!({"parameters": {"shape_frames": 0}}),
         "shape_frames",
     )?;
-    refused(&[("calib.toml", b"x"), ("points.csv", b"x")], json!({}), "say kind")?;
+    refused(&[("calib.toml", b"x"), ("points.csv", b"x")], json!({}), "kind is required")?;
     refused(
         &[("points.csv", b"x")],
         json!({"body_model": "shipped"}),
-        "body_model is for sessions with cameras",
+        "body_model is not a field of sparse runs",
     )?;
     refused(&[("points.csv", b"x")], json!({"kind": "holographic"}), "holographic")
 }

@@ -189,9 +189,12 @@ fn one_camera_is_enough_and_none_too() -> Result<()> {
     refused(json!({ "inverse_kinematics": { "solver": "extended" } }), "needs silhouettes")?;
     refused(json!({ "inverse_kinematics": { "solver": "magic" } }), "solver is \"magic\"")?;
     refused(json!({ "inverse_kinematics": { "steps": 0 } }), "steps is 0, expected 1 to 200")?;
-    refused(json!({ "kind": "sparse", "inverse_kinematics": {} }), "expected kind inverse-kinematics")?;
-    refused(json!({ "inverse_kinematics": {}, "motion_database": "walks" }), "motion_database is for runs")?;
-    refused(json!({ "inverse_kinematics": {}, "cameras": ["cam1"] }), "cameras is for cameras")?;
+    refused(json!({ "kind": "sparse", "inverse_kinematics": {} }), "but of inverse-kinematics runs")?;
+    refused(json!({ "inverse_kinematics": {}, "motion_database": "walks" }), "but of sparse runs")?;
+    refused(
+        json!({ "inverse_kinematics": {}, "cameras": ["cam1"] }),
+        "cameras is for runs that look at cameras",
+    )?;
     // what only the model knows ends the run, with words
     let run = api.start_run(&session, &json!({ "inverse_kinematics": { "stature_m": 4.0 } }))?;
     let end = api.wait(&run)?;

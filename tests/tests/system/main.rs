@@ -11,9 +11,11 @@ mod interface;
 mod inverse_kinematics;
 mod live;
 mod markers;
+mod requests;
 mod runs;
 mod tracking;
 mod uploads;
+mod versioned;
 
 use std::sync::OnceLock;
 

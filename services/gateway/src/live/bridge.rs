@@ -16,10 +16,11 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 
 use super::{
+    chosen::Chosen,
     messages::{self, FromClient, Nonsense, Start, Writer},
     replicas::Following,
+    shared::Live,
 };
-use crate::{App, routes::live::Chosen};
 
 /// The first message must come within this time.
 const START_WAIT: Duration = Duration::from_secs(10);
@@ -71,10 +72,10 @@ impl From<Status> for End {
 }
 
 /// Serves one WebSocket to its end.
-pub(crate) async fn serve(app: App, socket: WebSocket, chosen: Chosen) {
+pub(crate) async fn serve(live: Live, socket: WebSocket, chosen: Chosen) {
     let (mut sink, mut stream) = socket.split();
-    let end = match open(&app, &mut stream, chosen).await {
-        Ok((following, writer)) => both_ways(&app, &mut sink, &mut stream, following, &writer).await,
+    let end = match open(&live, &mut stream, chosen).await {
+        Ok((following, writer)) => both_ways(&live, &mut sink, &mut stream, following, &writer).await,
         Err(end) => end,
     };
     if end.code != close_code::NORMAL && end.code != close_code::AWAY {
@@ -90,14 +91,14 @@ pub(crate) async fn serve(app: App, socket: WebSocket, chosen: Chosen) {
 
 /// Reads the first message and starts a stream.
 async fn open(
-    app: &App,
+    live: &Live,
     stream: &mut SplitStream<WebSocket>,
     chosen: Chosen,
 ) -> Result<(Following, Writer), End> {
     let policy = |reason: String| End::new(close_code::POLICY, reason);
     let first = tokio::select! {
         first = timeout(START_WAIT, next_message(stream)) => first,
-        () = app.shutdown.cancelled() => return Err(End::new(close_code::AWAY, "the server is shutting down")),
+        () = live.shutdown.cancelled() => return Err(End::new(close_code::AWAY, "the server is shutting down")),
     };
     let first = first.map_err(|_| policy("no start came within 10 seconds".to_owned()))?;
     let start: Start = match first {
@@ -111,14 +112,14 @@ async fn open(
     let parameters = chosen.parameters(start.parameters.clone(), !start.skeleton_asf.is_empty());
     let parameters = parameters.map_err(|error| policy(error.to_string()))?;
     let wire = start.to_wire(&chosen.database_id, parameters).map_err(policy)?;
-    let following = app.live.replicas.follow(&wire).await?;
+    let following = live.replicas.follow(&wire).await?;
     let writer = Writer { motion_database: chosen.database, points: start.points, is_binary: start.binary };
     Ok((following, writer))
 }
 
 /// Frames in and answers out until one side ends.
 async fn both_ways(
-    app: &App,
+    live: &Live,
     sink: &mut SplitSink<WebSocket, Message>,
     stream: &mut SplitStream<WebSocket>,
     following: Following,
@@ -131,7 +132,7 @@ async fn both_ways(
         let requests = requests;
         tokio::select! {
             end = read(stream, &requests) => Some(end),
-            () = app.shutdown.cancelled() => {
+            () = live.shutdown.cancelled() => {
                 Some(End::new(close_code::AWAY, "the server is shutting down; go on with the last state"))
             }
             () = written.cancelled() => None,

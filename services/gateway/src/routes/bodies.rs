@@ -1,24 +1,19 @@
 //! Body models and bodies of theirs as files.
 
 use axum::{
-    extract::State,
     http::{HeaderMap, header},
     response::{IntoResponse, Response},
 };
-use body::{BodyModel as Model, Sex, Wanted, shipped};
+use body::{Sex, Wanted, shipped};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
-use super::{
-    body_models::find,
-    download::{self, Object},
-    lookup::{Latest, Lock},
-};
+use super::download::{self, Object};
 use crate::{
-    App,
     access::Reader,
     error::{Error, Result},
     extract::{Path, Query},
+    versioned::{self, BodyModel, Latest, Versioned},
 };
 
 /// Download a body model
@@ -30,27 +25,24 @@ use crate::{
     responses((status = 200, content_type = "application/octet-stream"), (status = 206), (status = 304)),
 )]
 pub(super) async fn file(
-    State(app): State<App>,
-    Reader(caller): Reader,
+    Reader(by): Reader,
     Path(which): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response> {
-    let mut db = app.db.acquire().await?;
-    let model = find(&mut db, caller.project_id, &which, Latest::Ready, Lock::None).await?;
-    drop(db);
+    let model: BodyModel = versioned::look(&by, &which, Latest::Ready).await?;
     let ready = model.ready()?;
-    let name = format!("{}-{}.marey-body", model.name, model.version);
+    let name = format!("{}-{}.marey-body", ready.name, ready.version);
     let Some(store_key) = &ready.store_key else {
         return Ok(whole(&name, "application/octet-stream", shipped().bytes.clone()));
     };
     let object = Object {
         name: &name,
         store_key,
-        bytes: model.bytes.unwrap_or_default(),
+        bytes: model.version().bytes.unwrap_or_default(),
         blake3: &ready.blake3,
         media_type: "application/octet-stream",
     };
-    download::send(&app, &headers, &object).await
+    download::send(&by.app, &headers, &object).await
 }
 
 /// Which body is wanted of a model; the mean when nothing is said.
@@ -80,8 +72,7 @@ pub(crate) struct BodyQuery {
     responses((status = 200, content_type = "model/gltf-binary")),
 )]
 pub(super) async fn glb(
-    State(app): State<App>,
-    Reader(caller): Reader,
+    Reader(by): Reader,
     Path(which): Path<String>,
     Query(query): Query<BodyQuery>,
 ) -> Result<Response> {
@@ -95,25 +86,24 @@ pub(super) async fn glb(
     };
     let wanted =
         Wanted { stature_m: query.stature_m, mass_kg: query.mass_kg, age_years: query.age_years, sex };
-    let mut db = app.db.acquire().await?;
-    let found = find(&mut db, caller.project_id, &which, Latest::Ready, Lock::None).await?;
-    drop(db);
-    let stored = match found.ready()?.store_key {
+    let found: BodyModel = versioned::look(&by, &which, Latest::Ready).await?;
+    let ready = found.ready()?;
+    let stored = match &ready.store_key {
         None => None,
-        Some(key) => Some(app.store.get(&key.parse()?, body::MAX_BYTES as u64).await?),
+        Some(key) => Some(by.app.store.get(&key.parse()?, body::MAX_BYTES as u64).await?),
     };
     let made = tokio::task::spawn_blocking(move || -> Result<Vec<u8>> {
         let model = match stored {
             None => shipped().model.clone(),
-            Some(bytes) => {
-                Model::from_bytes(&bytes).map_err(|e| Error::Internal(format!("body model: {e}")))?.into()
-            }
+            Some(bytes) => body::BodyModel::from_bytes(&bytes)
+                .map_err(|e| Error::Internal(format!("body model: {e}")))?
+                .into(),
         };
         let alpha = model.alpha_for(&wanted).map_err(|e| Error::Unprocessable(e.to_string()))?;
         body::glb(&model, &model.shape(&alpha), None).map_err(|e| Error::Internal(e.to_string()))
     });
     let bytes = made.await.map_err(|e| Error::Internal(format!("task: {e}")))??;
-    Ok(whole(&format!("{}-{}.glb", found.name, found.version), "model/gltf-binary", bytes))
+    Ok(whole(&format!("{}-{}.glb", ready.name, ready.version), "model/gltf-binary", bytes))
 }
 
 /// An answer that is a file which is in no store. Names of models need no quoting.

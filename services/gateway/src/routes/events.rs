@@ -2,18 +2,19 @@
 
 use std::{convert::Infallible, time::Duration};
 
-use axum::{
-    extract::State,
-    response::sse::{Event, KeepAlive, Sse},
-};
+use axum::response::sse::{Event, KeepAlive, Sse};
 use futures::Stream;
 use serde::Serialize;
 use tokio::time::timeout;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::runs::{self, Run};
-use crate::{App, access::Reader, error::Result, extract::Path};
+use crate::{
+    access::{Access, Reader},
+    error::Result,
+    extract::Path,
+    runs::{Run, run},
+};
 
 /// How often to look when no notification comes: they may be lost.
 const POLL: Duration = Duration::from_secs(1);
@@ -56,14 +57,13 @@ impl From<Run> for Progress {
     responses((status = 200, body = Progress, content_type = "text/event-stream")),
 )]
 pub(super) async fn watch(
-    State(app): State<App>,
-    Reader(caller): Reader,
+    Reader(Access { app, caller }): Reader,
     Path(run_id): Path<Uuid>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>> {
     // first subscribed, then looked: nothing in between is missed
     let mut changes = app.changes.subscribe();
     let mut db = app.db.acquire().await?;
-    let mut now: Progress = runs::find(&mut db, caller.project_id, run_id).await?.into();
+    let mut now: Progress = run::find(&mut db, caller.project_id, run_id).await?.into();
     drop(db);
     let stream = async_stream::stream! {
         loop {
@@ -83,7 +83,7 @@ pub(super) async fn watch(
                 }
                 let found = async {
                     let mut db = app.db.acquire().await?;
-                    runs::find(&mut db, caller.project_id, run_id).await
+                    run::find(&mut db, caller.project_id, run_id).await
                 };
                 match found.await.map(Progress::from) {
                     Ok(next) if next != now => {

@@ -2,26 +2,22 @@
 
 use axum::{
     extract::{
-        FromRequestParts, State,
+        FromRequestParts,
         ws::{WebSocketUpgrade, rejection::WebSocketUpgradeRejection},
     },
     http::{HeaderValue, header, request::Parts},
     response::Response,
 };
 use serde::Deserialize;
-use serde_json::{Map, Value};
 use utoipa::IntoParams;
 
-use super::{
-    lookup::{self, Latest, Lock},
-    start,
-};
 use crate::{
     App,
     access::Writer,
     error::{Error, Result},
     extract::Query,
-    live,
+    live::{self, Chosen},
+    versioned::{self, Latest, MotionDatabase},
 };
 
 /// Name of the messages' language, as a WebSocket subprotocol.
@@ -41,26 +37,6 @@ pub(crate) struct LiveQuery {
     /// the motion database to learn from: id, `name` (its latest version that is ready) or `name@version`
     #[param(example = "walks")]
     motion_database: String,
-}
-
-/// A motion database of the caller's, which a stream learns from.
-#[derive(Debug)]
-pub(crate) struct Chosen {
-    /// its id
-    pub database_id: String,
-    /// `name@version`
-    pub database: String,
-}
-
-impl Chosen {
-    /// All parameters as JSON, those left out with their defaults.
-    ///
-    /// # Errors
-    /// If one is not known or out of range.
-    pub fn parameters(&self, given: Map<String, Value>, has_own_skeleton: bool) -> Result<String> {
-        let parameters = start::resolve_parameters(given, has_own_skeleton)?;
-        Ok(serde_json::to_value(parameters)?.to_string())
-    }
 }
 
 /// A caller who may follow performers. Browsers can't set headers of a WebSocket: they name the key as a subprotocol.
@@ -96,26 +72,14 @@ impl FromRequestParts<App> for Follower {
     responses((status = 101, description = "the WebSocket is open")),
 )]
 pub(super) async fn follow(
-    State(app): State<App>,
-    Follower(Writer(caller)): Follower,
+    Follower(Writer(by)): Follower,
     Query(query): Query<LiveQuery>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response> {
-    let mut db = app.db.acquire().await?;
-    let database = lookup::motion_database(
-        &mut db,
-        caller.project_id,
-        &query.motion_database,
-        Latest::Ready,
-        Lock::None,
-    )
-    .await?;
-    drop(db);
-    let name = format!("{}@{}", database.name, database.version);
-    if database.store_key.is_none() {
-        return Err(Error::Conflict(format!("motion database {name} is {}, expected ready", database.state)));
-    }
-    let chosen = Chosen { database_id: database.id.to_string(), database: name };
+    let database: MotionDatabase = versioned::look(&by, &query.motion_database, Latest::Ready).await?;
+    let ready = database.ready()?;
+    let chosen =
+        Chosen { database_id: ready.id.to_string(), database: format!("{}@{}", ready.name, ready.version) };
     let upgrade = upgrade
         .map_err(|rejection| Error::BadRequest(format!("expected a WebSocket: {}", rejection.body_text())))?;
     let upgrade = upgrade
@@ -123,6 +87,6 @@ pub(super) async fn follow(
         .max_message_size(MAX_MESSAGE_BYTES)
         .max_frame_size(MAX_MESSAGE_BYTES)
         .max_write_buffer_size(MAX_UNWRITTEN_BYTES);
-    let serving = app.live.tasks.clone();
-    Ok(upgrade.on_upgrade(move |socket| serving.track_future(live::serve(app, socket, chosen))))
+    let serving = by.app.live.tasks.clone();
+    Ok(upgrade.on_upgrade(move |socket| serving.track_future(live::serve(by.app.live, socket, chosen))))
 }

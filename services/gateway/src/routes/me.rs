@@ -2,7 +2,7 @@ use axum::Json;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::access::Reader;
+use crate::access::{Access, Reader};
 
 /// Who you are to this server.
 #[derive(Debug, Serialize, ToSchema)]
@@ -22,7 +22,7 @@ pub(crate) struct Me {
 ///
 /// The project and the scopes of the API key in use.
 #[utoipa::path(get, path = "/v1/me", tag = "me", responses((status = 200, body = Me)))]
-pub(super) async fn show(Reader(caller): Reader) -> Json<Me> {
+pub(super) async fn show(Reader(Access { caller, .. }): Reader) -> Json<Me> {
     Json(Me {
         project: caller.project,
         key: caller.key_name,

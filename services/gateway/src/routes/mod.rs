@@ -1,26 +1,19 @@
 //! The handlers, by noun.
 
 mod bodies;
-mod body_builds;
 mod body_models;
-mod builds;
-mod cameras;
-mod contents;
-mod databases;
 mod download;
 mod events;
-mod files;
-mod inverse_kinematics;
-pub(crate) mod live;
-mod lookup;
+mod live;
 mod me;
+mod motion_databases;
 mod operations;
 mod results;
 mod runs;
 mod session_files;
 mod sessions;
-mod source_files;
-mod start;
+
+use std::sync::Arc;
 
 use axum::{
     Router,
@@ -36,32 +29,28 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::{App, error::Error, extract::MAX_JSON_BYTES, observe, openapi};
 
 /// Every route of the API, with its description.
-pub(crate) fn described() -> OpenApiRouter<App> {
+fn described() -> OpenApiRouter<App> {
     OpenApiRouter::with_openapi(openapi::head())
         .routes(routes!(me::show))
         .routes(routes!(sessions::create, sessions::list))
         .routes(routes!(sessions::show, sessions::delete))
-        .routes(routes!(session_files::list_of_session))
-        .routes(routes!(
-            session_files::put_in_session,
-            session_files::get_of_session,
-            session_files::delete_of_session
-        ))
-        .routes(routes!(start::reconstruction, runs::list_of_session))
-        .routes(routes!(databases::create, databases::list))
-        .routes(routes!(databases::show, databases::delete))
-        .routes(routes!(source_files::list_of_database))
-        .routes(routes!(source_files::put_in_database, source_files::delete_of_database))
-        .routes(routes!(databases::clips))
-        .routes(routes!(builds::build))
-        .routes(routes!(builds::train))
+        .routes(routes!(session_files::list))
+        .routes(routes!(session_files::put, session_files::get, session_files::delete))
+        .routes(routes!(runs::start, runs::list_by_session))
+        .routes(routes!(motion_databases::create, motion_databases::list))
+        .routes(routes!(motion_databases::show, motion_databases::delete))
+        .routes(routes!(motion_databases::list_files))
+        .routes(routes!(motion_databases::put_file, motion_databases::delete_file))
+        .routes(routes!(motion_databases::clips))
+        .routes(routes!(motion_databases::build))
+        .routes(routes!(motion_databases::train))
         .routes(routes!(body_models::create, body_models::list))
         .routes(routes!(body_models::show, body_models::delete))
-        .routes(routes!(body_builds::build))
+        .routes(routes!(body_models::list_files))
+        .routes(routes!(body_models::put_file, body_models::delete_file))
+        .routes(routes!(body_models::build))
         .routes(routes!(bodies::file))
         .routes(routes!(bodies::glb))
-        .routes(routes!(source_files::list_of_body_model))
-        .routes(routes!(source_files::put_in_body_model, source_files::delete_of_body_model))
         .routes(routes!(runs::list))
         .routes(routes!(runs::show))
         .routes(routes!(runs::cancel))
@@ -74,6 +63,11 @@ pub(crate) fn described() -> OpenApiRouter<App> {
         .routes(routes!(operations::metrics))
 }
 
+/// The OpenAPI 3.1 document, as it is served at `/openapi.json`.
+pub fn openapi_document() -> utoipa::openapi::OpenApi {
+    openapi::finish(described().into_openapi())
+}
+
 /// The whole service: API, its description, and what surrounds every request.
 pub fn router(app: App) -> Router {
     let (router, api) = described().split_for_parts();
@@ -84,7 +78,7 @@ pub fn router(app: App) -> Router {
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
         .layer(middleware::from_fn_with_state(app.clone(), limit_time))
         .layer(CatchPanicLayer::custom(after_panic))
-        .layer(middleware::from_fn_with_state(app.clone(), observe::count_request))
+        .layer(middleware::from_fn_with_state(Arc::clone(&app.http_counts), observe::count_request))
         .layer(TraceLayer::new_for_http())
         .with_state(app)
 }

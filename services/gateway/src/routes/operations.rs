@@ -50,6 +50,6 @@ pub(super) async fn readyz(State(app): State<App>) -> Result<Json<Health>> {
     responses((status = 200, body = String, content_type = "text/plain")),
 )]
 pub(super) async fn metrics(State(app): State<App>) -> Result<Response> {
-    let text = observe::render(&app).await?;
+    let text = observe::render(&app.db, &app.http_counts).await?;
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response())
 }

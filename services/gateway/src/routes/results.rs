@@ -1,18 +1,16 @@
-use axum::{Json, extract::State, http::HeaderMap, response::Response};
+use axum::{Json, http::HeaderMap, response::Response};
 use queue::{Artefact, RunId};
 use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::{
-    download::{self, Object},
-    runs,
-};
+use super::download::{self, Object};
 use crate::{
     App,
-    access::Reader,
+    access::{Access, Reader},
     error::{Error, Result},
     extract::Path,
+    runs::run,
 };
 
 /// A file that a run has made.
@@ -32,9 +30,9 @@ pub(crate) struct ResultFile {
     url: String,
 }
 
-async fn of_run(app: &App, project_id: Uuid, run_id: Uuid) -> Result<Vec<Artefact>> {
+async fn find(app: &App, project_id: Uuid, run_id: Uuid) -> Result<Vec<Artefact>> {
     let mut db = app.db.acquire().await?;
-    runs::find(&mut db, project_id, run_id).await?;
+    run::find(&mut db, project_id, run_id).await?;
     Ok(queue::run_results(&mut db, RunId(run_id)).await?)
 }
 
@@ -47,11 +45,10 @@ async fn of_run(app: &App, project_id: Uuid, run_id: Uuid) -> Result<Vec<Artefac
     params(("run_id" = Uuid, Path,)), responses((status = 200, body = Vec<ResultFile>)),
 )]
 pub(super) async fn list(
-    State(app): State<App>,
-    Reader(caller): Reader,
+    Reader(Access { app, caller }): Reader,
     Path(run_id): Path<Uuid>,
 ) -> Result<Json<Vec<ResultFile>>> {
-    let results = of_run(&app, caller.project_id, run_id).await?;
+    let results = find(&app, caller.project_id, run_id).await?;
     let view = |artefact: Artefact| ResultFile {
         url: format!("/v1/runs/{run_id}/results/{}", artefact.name),
         name: artefact.name,
@@ -71,12 +68,11 @@ pub(super) async fn list(
     responses((status = 200, content_type = "application/octet-stream"), (status = 206), (status = 304)),
 )]
 pub(super) async fn get(
-    State(app): State<App>,
-    Reader(caller): Reader,
+    Reader(Access { app, caller }): Reader,
     Path((run_id, name)): Path<(Uuid, String)>,
     headers: HeaderMap,
 ) -> Result<Response> {
-    let results = of_run(&app, caller.project_id, run_id).await?;
+    let results = find(&app, caller.project_id, run_id).await?;
     let result = results.iter().find(|r| r.name == name).ok_or_else(|| Error::not_found("result", &name))?;
     let object = Object {
         name: &result.name,

@@ -1,120 +1,50 @@
-use axum::{Json, extract::State};
-use chrono::{DateTime, Utc};
+use axum::Json;
 use queue::RunId;
-use serde::Serialize;
-use serde_json::Value;
-use sqlx::PgConnection;
-use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::lookup::{self, Lock};
 use crate::{
-    App,
-    access::{Reader, Writer},
-    error::{Error, Result},
-    extract::{Path, Query},
-    page::{Item, Page, PageQuery},
+    access::{Access, Reader, Writer},
+    answer::Answer,
+    error::Result,
+    extract::{Path, Posted, Query},
+    files,
+    lock::Lock,
+    page::{Page, PageQuery},
+    runs::{Run, RunWithJobs, enqueue, request::NewSessionRun, run, session_run::OnSession},
+    sessions,
 };
 
-/// A run: what was asked for and how far it is.
-#[derive(Debug, Serialize, ToSchema, sqlx::FromRow)]
-pub(crate) struct Run {
-    /// id
-    pub id: Uuid,
-    /// `reconstruction`, `multi-view` (of a session with cameras), `inverse-kinematics`, `motion-database` or `body-model` (a
-    /// build), or `training`
-    #[schema(example = "reconstruction")]
-    pub kind: String,
-    /// `queued`, `running`, `succeeded`, `failed` or `cancelled`
-    #[schema(example = "running")]
-    pub state: String,
-    /// 0 to 1
-    #[schema(example = 0.4)]
-    pub progress: f64,
-    /// what is being done, in words
-    #[schema(example = "reconstructing frames 600 to 1200")]
-    pub phrase: String,
-    /// why it failed; null unless `failed`
-    pub error: Option<String>,
-    /// the session that it reconstructs
-    pub session_id: Option<Uuid>,
-    /// the motion database that it uses
-    pub motion_database_id: Option<Uuid>,
-    /// the body model that it uses; null for the shipped one
-    pub body_model_id: Option<Uuid>,
-    /// everything that determines the result, resolved: files, points, database, parameters of the method
-    pub parameters: Value,
-    /// when it was asked for
-    pub created_at: DateTime<Utc>,
-    /// when its first job was begun
-    pub started_at: Option<DateTime<Utc>>,
-    /// when it ended
-    pub finished_at: Option<DateTime<Utc>>,
-}
-
-impl Item for Run {
-    fn id(&self) -> Uuid {
-        self.id
+/// Start a run on a session
+///
+/// Full-body motion from the session's control points (`sparse`), the body of a person and its motion from what its cameras
+/// saw (`multi-view`), or poses of a body by inverse kinematics, from measured points and silhouettes
+/// (`inverse-kinematics`). `kind` is what the session's files are for when it is left out, and required if they are for both
+/// of the first two. Answers at once (202) with the run; watch it at `/v1/runs/{run_id}/events`.
+#[utoipa::path(
+    post, path = "/v1/sessions/{session_id}/runs", tag = "runs", request_body = NewSessionRun,
+    params(
+        ("session_id" = Uuid, Path,),
+        ("Idempotency-Key" = Option<String>, Header, description = "the same key gives the same answer for a day"),
+    ),
+    responses((status = 202, body = Run, headers(("Location" = String, description = "the run")))),
+)]
+pub(super) async fn start(
+    Writer(Access { app, caller }): Writer,
+    Path(session_id): Path<Uuid>,
+    Posted { body, request }: Posted<NewSessionRun>,
+) -> Result<Answer> {
+    let project_id = caller.project_id;
+    // What is wrong with the request is said before anything is looked up.
+    body.check()?;
+    let mut tx = app.db.begin().await?;
+    if let Some(answer) = request.replay(&mut tx, project_id).await? {
+        return Ok(answer);
     }
-}
-
-/// A run and its jobs.
-#[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct RunWithJobs {
-    #[serde(flatten)]
-    run: Run,
-    /// its jobs by kind and state
-    jobs: Vec<JobSummary>,
-}
-
-/// Jobs of one kind in one state.
-#[derive(Debug, Serialize, ToSchema, sqlx::FromRow)]
-pub(crate) struct JobSummary {
-    /// kind of job
-    #[schema(example = "reconstruct-chunk")]
-    kind: String,
-    /// `blocked`, `available`, `running`, `succeeded`, `failed` or `cancelled`
-    #[schema(example = "succeeded")]
-    state: String,
-    /// how many
-    count: i64,
-    /// attempts that they took together
-    attempts: i64,
-    /// the workers that had them last
-    workers: Vec<String>,
-}
-
-/// The columns of [`Run`]. A run's position in lists is its id: time-ordered.
-macro_rules! select_runs {
-    ($rest:literal) => {
-        concat!(
-            "SELECT id, kind, state, progress, phrase, error_message AS error, session_id, motion_database_id,
-                    body_model_id, parameters, created_at, started_at, finished_at FROM runs ",
-            $rest
-        )
-    };
-}
-
-/// The run of that id in the project.
-pub(super) async fn find(db: &mut PgConnection, project_id: Uuid, id: Uuid) -> Result<Run> {
-    sqlx::query_as(select_runs!("WHERE id = $1 AND project_id = $2"))
-        .bind(id)
-        .bind(project_id)
-        .fetch_optional(db)
-        .await?
-        .ok_or_else(|| Error::not_found("run", id))
-}
-
-async fn with_jobs(db: &mut PgConnection, run: Run) -> Result<RunWithJobs> {
-    let jobs = sqlx::query_as(
-        "SELECT kind, state, count(*) AS count, sum(attempts) AS attempts,
-                coalesce(array_agg(DISTINCT last_worker) FILTER (WHERE last_worker IS NOT NULL), '{}') AS workers
-         FROM jobs WHERE run_id = $1 GROUP BY kind, state ORDER BY min(id), state",
-    )
-    .bind(run.id)
-    .fetch_all(db)
-    .await?;
-    Ok(RunWithJobs { run, jobs })
+    let session = sessions::find(&mut tx, project_id, session_id, Lock::Share).await?;
+    let files = files::inputs(&mut tx, session_id).await?;
+    let run = body.plan(&mut tx, project_id, OnSession { session, files }).await?;
+    let run_id = run.enqueue(&mut tx, project_id).await?;
+    enqueue::accept(tx, &request, project_id, run_id).await
 }
 
 /// List runs
@@ -124,12 +54,10 @@ async fn with_jobs(db: &mut PgConnection, run: Run) -> Result<RunWithJobs> {
     get, path = "/v1/runs", tag = "runs", params(PageQuery), responses((status = 200, body = Page<Run>)),
 )]
 pub(super) async fn list(
-    State(app): State<App>,
-    Reader(caller): Reader,
+    Reader(Access { app, caller }): Reader,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<Run>>> {
-    let query = select_runs!("WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3");
-    page.of(&app.db, query, caller.project_id).await
+    page.select(&app.db, run::SELECT_BY_PROJECT, caller.project_id).await
 }
 
 /// List the runs of a session
@@ -139,17 +67,15 @@ pub(super) async fn list(
     get, path = "/v1/sessions/{session_id}/runs", tag = "runs",
     params(("session_id" = Uuid, Path,), PageQuery), responses((status = 200, body = Page<Run>)),
 )]
-pub(super) async fn list_of_session(
-    State(app): State<App>,
-    Reader(caller): Reader,
+pub(super) async fn list_by_session(
+    Reader(Access { app, caller }): Reader,
     Path(session_id): Path<Uuid>,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<Run>>> {
     let mut db = app.db.acquire().await?;
-    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
+    sessions::find(&mut db, caller.project_id, session_id, Lock::None).await?;
     drop(db);
-    let query = select_runs!("WHERE session_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3");
-    page.of(&app.db, query, session_id).await
+    page.select(&app.db, run::SELECT_BY_SESSION, session_id).await
 }
 
 /// Show a run
@@ -158,13 +84,12 @@ pub(super) async fn list_of_session(
     params(("run_id" = Uuid, Path,)), responses((status = 200, body = RunWithJobs)),
 )]
 pub(super) async fn show(
-    State(app): State<App>,
-    Reader(caller): Reader,
+    Reader(Access { app, caller }): Reader,
     Path(run_id): Path<Uuid>,
 ) -> Result<Json<RunWithJobs>> {
     let mut db = app.db.acquire().await?;
-    let run = find(&mut db, caller.project_id, run_id).await?;
-    Ok(Json(with_jobs(&mut db, run).await?))
+    let run = run::find(&mut db, caller.project_id, run_id).await?;
+    Ok(Json(run::with_jobs(&mut db, run).await?))
 }
 
 /// Cancel a run
@@ -175,15 +100,14 @@ pub(super) async fn show(
     params(("run_id" = Uuid, Path,)), responses((status = 200, body = RunWithJobs)),
 )]
 pub(super) async fn cancel(
-    State(app): State<App>,
-    Writer(caller): Writer,
+    Writer(Access { app, caller }): Writer,
     Path(run_id): Path<Uuid>,
 ) -> Result<Json<RunWithJobs>> {
     let mut tx = app.db.begin().await?;
-    find(&mut tx, caller.project_id, run_id).await?;
+    run::find(&mut tx, caller.project_id, run_id).await?;
     queue::cancel_run(&mut tx, RunId(run_id)).await?;
-    let run = find(&mut tx, caller.project_id, run_id).await?;
-    let run = with_jobs(&mut tx, run).await?;
+    let run = run::find(&mut tx, caller.project_id, run_id).await?;
+    let run = run::with_jobs(&mut tx, run).await?;
     tx.commit().await?;
     Ok(Json(run))
 }

@@ -3,7 +3,6 @@
 use axum::{
     Json,
     body::Body,
-    extract::State,
     http::{HeaderMap, StatusCode},
     response::Response,
 };
@@ -12,17 +11,15 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 use uuid::Uuid;
 
-use super::{
-    download::{self, Object},
-    files::{self, File, Owner},
-    lookup::{self, Lock},
-};
+use super::download::{self, Object};
 use crate::{
-    App,
-    access::{Reader, Writer},
+    access::{Access, Reader, Writer},
     error::{Error, Result},
     extract::{Path, Query},
+    files::{self, File},
+    lock::Lock,
     names,
+    sessions::{self, SessionFiles},
     upload::Announced,
 };
 
@@ -43,21 +40,20 @@ pub(crate) struct PutQuery {
     get, path = "/v1/sessions/{session_id}/files", tag = "files",
     params(("session_id" = Uuid, Path,)), responses((status = 200, body = Vec<File>)),
 )]
-pub(super) async fn list_of_session(
-    State(app): State<App>,
-    Reader(caller): Reader,
+pub(super) async fn list(
+    Reader(Access { app, caller }): Reader,
     Path(session_id): Path<Uuid>,
 ) -> Result<Json<Vec<File>>> {
     let mut db = app.db.acquire().await?;
-    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
-    Ok(Json(files::of_owner(&mut db, session_id).await?))
+    sessions::find(&mut db, caller.project_id, session_id, Lock::None).await?;
+    Ok(Json(files::list(&mut db, session_id).await?))
 }
 
 /// Upload a file to a session
 ///
 /// The body is the file's content. A `Content-Digest: sha-256=:<base64>:` header (RFC 9530) is checked; a file that
 /// is too large, has another checksum or breaks off is not kept. Another file of the same name is replaced (200), unless a
-/// run of the session goes on (409).
+/// run of the session is under way (409).
 #[utoipa::path(
     put, path = "/v1/sessions/{session_id}/files/{name}", tag = "files",
     params(
@@ -67,9 +63,8 @@ pub(super) async fn list_of_session(
     request_body(content = String, content_type = "application/octet-stream"),
     responses((status = 201, body = File), (status = 200, body = File, description = "replaced")),
 )]
-pub(super) async fn put_in_session(
-    State(app): State<App>,
-    Writer(caller): Writer,
+pub(super) async fn put(
+    Writer(Access { app, caller }): Writer,
     Path((session_id, name)): Path<(Uuid, String)>,
     Query(query): Query<PutQuery>,
     headers: HeaderMap,
@@ -91,12 +86,9 @@ pub(super) async fn put_in_session(
     }
     let announced = Announced::read(&headers)?;
     let mut db = app.db.acquire().await?;
-    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
+    sessions::find(&mut db, caller.project_id, session_id, Lock::None).await?;
     drop(db);
-    let file_id = Uuid::now_v7();
-    let key = store::key::file(caller.project_id, session_id, file_id);
-    let upload = files::Upload { file_id, owner: Owner::Session(session_id), name, role, key };
-    files::receive(app, caller.project_id, upload, announced, body).await
+    files::receive(app, caller.project_id, SessionFiles(session_id), (name, role), announced, body).await
 }
 
 /// Download a file of a session
@@ -107,15 +99,14 @@ pub(super) async fn put_in_session(
     params(("session_id" = Uuid, Path,), ("name" = String, Path,)),
     responses((status = 200, content_type = "application/octet-stream"), (status = 206), (status = 304)),
 )]
-pub(super) async fn get_of_session(
-    State(app): State<App>,
-    Reader(caller): Reader,
+pub(super) async fn get(
+    Reader(Access { app, caller }): Reader,
     Path((session_id, name)): Path<(Uuid, String)>,
     headers: HeaderMap,
 ) -> Result<Response> {
     let mut db = app.db.acquire().await?;
-    lookup::session(&mut db, caller.project_id, session_id, Lock::None).await?;
-    let files = files::of_owner(&mut db, session_id).await?;
+    sessions::find(&mut db, caller.project_id, session_id, Lock::None).await?;
+    let files = files::list(&mut db, session_id).await?;
     drop(db);
     let file = files.iter().find(|f| f.name == name).ok_or_else(|| Error::not_found("file", &name))?;
     let object = Object {
@@ -130,15 +121,14 @@ pub(super) async fn get_of_session(
 
 /// Delete a file of a session
 ///
-/// Refused (409) while a run of the session goes on.
+/// Refused (409) while a run of the session is under way.
 #[utoipa::path(
     delete, path = "/v1/sessions/{session_id}/files/{name}", tag = "files",
     params(("session_id" = Uuid, Path,), ("name" = String, Path,)), responses((status = 204)),
 )]
-pub(super) async fn delete_of_session(
-    State(app): State<App>,
-    Writer(caller): Writer,
+pub(super) async fn delete(
+    Writer(Access { app, caller }): Writer,
     Path((session_id, name)): Path<(Uuid, String)>,
 ) -> Result<StatusCode> {
-    files::remove(app, caller.project_id, Owner::Session(session_id), name).await
+    files::remove(app, caller.project_id, SessionFiles(session_id), name).await
 }

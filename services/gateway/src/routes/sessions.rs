@@ -1,18 +1,18 @@
-use axum::{Json, extract::State, http::StatusCode};
+use axum::{Json, http::StatusCode};
 use queue::RunId;
 use serde::Deserialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::lookup::{self, Lock, Session};
 use crate::{
-    App,
-    access::{Reader, Writer},
+    access::{Access, Reader, Writer},
     answer::Answer,
     error::{Error, Result},
     extract::{Path, Posted, Query},
+    lock::Lock,
     names,
     page::{Page, PageQuery},
+    sessions::{self, Session},
     upload::uninterrupted,
 };
 
@@ -38,8 +38,7 @@ pub(crate) struct NewSession {
     responses((status = 201, body = Session, headers(("Location" = String, description = "the session")))),
 )]
 pub(super) async fn create(
-    State(app): State<App>,
-    Writer(caller): Writer,
+    Writer(Access { app, caller }): Writer,
     Posted { body, request }: Posted<NewSession>,
 ) -> Result<Answer> {
     names::check_session_name(&body.name)?;
@@ -76,13 +75,12 @@ pub(super) async fn create(
     responses((status = 200, body = Page<Session>)),
 )]
 pub(super) async fn list(
-    State(app): State<App>,
-    Reader(caller): Reader,
+    Reader(Access { app, caller }): Reader,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<Session>>> {
     let query = "SELECT id, name, tags, created_at FROM sessions
                  WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3";
-    page.of(&app.db, query, caller.project_id).await
+    page.select(&app.db, query, caller.project_id).await
 }
 
 /// Show a session
@@ -91,32 +89,32 @@ pub(super) async fn list(
     params(("session_id" = Uuid, Path,)), responses((status = 200, body = Session)),
 )]
 pub(super) async fn show(
-    State(app): State<App>,
-    Reader(caller): Reader,
+    Reader(Access { app, caller }): Reader,
     Path(id): Path<Uuid>,
 ) -> Result<Json<Session>> {
     let mut db = app.db.acquire().await?;
-    Ok(Json(lookup::session(&mut db, caller.project_id, id, Lock::None).await?))
+    Ok(Json(sessions::find(&mut db, caller.project_id, id, Lock::None).await?))
 }
 
 /// Delete a session
 ///
-/// With its files, runs and their results. Refused (409) while a run of it goes on: cancel that first.
+/// With its files, runs and their results. Refused (409) while a run of it is under way: cancel that first.
 #[utoipa::path(
     delete, path = "/v1/sessions/{session_id}", tag = "sessions",
     params(("session_id" = Uuid, Path,)), responses((status = 204)),
 )]
 pub(super) async fn delete(
-    State(app): State<App>,
-    Writer(caller): Writer,
+    Writer(Access { app, caller }): Writer,
     Path(id): Path<Uuid>,
 ) -> Result<StatusCode> {
     uninterrupted(async move {
         let mut tx = app.db.begin().await?;
-        lookup::session(&mut tx, caller.project_id, id, Lock::Update).await?;
-        let active = lookup::active_runs_of_session(&mut tx, id).await?;
+        sessions::find(&mut tx, caller.project_id, id, Lock::Update).await?;
+        let active = sessions::count_active_runs(&mut tx, id).await?;
         if active > 0 {
-            return Err(Error::Conflict(format!("{active} runs of this session go on; cancel them first")));
+            return Err(Error::Conflict(format!(
+                "{active} runs of this session are under way; cancel them first"
+            )));
         }
         let runs: Vec<RunId> = sqlx::query_scalar("SELECT id FROM runs WHERE session_id = $1")
             .bind(id)

@@ -1,18 +1,15 @@
-//! Uploaded files, whosever they are: received, recorded, replaced and removed.
+//! Uploaded files, whosever they are: received, recorded, replaced and removed. The only place that knows their table.
 
 use axum::{Json, body::Body, http::StatusCode};
 use chrono::{DateTime, Utc};
 use formats::FileRole;
+use jobs::InputFile;
 use serde::Serialize;
 use sqlx::PgConnection;
 use store::{Key, Stored};
 use utoipa::{ToSchema, openapi};
 use uuid::Uuid;
 
-use super::{
-    body_models::{self, BodyModel},
-    lookup::{self, Latest, Lock, MotionDatabase},
-};
 use crate::{
     App,
     error::{Error, Result},
@@ -23,7 +20,7 @@ use crate::{
 /// An uploaded file.
 #[derive(Debug, Serialize, ToSchema, sqlx::FromRow)]
 pub(crate) struct File {
-    /// name within the session or motion database
+    /// name within the session, motion database or body model
     #[schema(example = "points.csv")]
     pub name: String,
     /// `skeleton`, `control-points`, `ground-truth`, `calibration`, `video`, `images`, `masks` or `plate`; `motion` or
@@ -44,7 +41,7 @@ pub(crate) struct File {
 }
 
 /// The words of [`FileRole`].
-pub(super) fn role_schema() -> openapi::Object {
+pub(crate) fn role_schema() -> openapi::Object {
     let words = FileRole::ALL.map(FileRole::as_str);
     openapi::ObjectBuilder::new()
         .schema_type(openapi::Type::String)
@@ -53,80 +50,93 @@ pub(super) fn role_schema() -> openapi::Object {
         .build()
 }
 
-/// All files of a session or of a motion database, by name.
-pub(super) async fn of_owner(db: &mut PgConnection, owner: Uuid) -> Result<Vec<File>> {
+/// Whose files they are.
+pub(crate) trait Owner: Send + Sync + 'static {
+    /// The table that it is a row of.
+    const TABLE: &'static str;
+
+    /// Its id.
+    fn id(&self) -> Uuid;
+
+    /// Where a file of its is stored.
+    fn key(&self, project_id: Uuid, file_id: Uuid) -> Key;
+
+    /// Holds it until the transaction ends, and refuses if its files are fixed.
+    fn lock(&self, db: &mut PgConnection, project_id: Uuid) -> impl Future<Output = Result<()>> + Send;
+
+    /// Refuses if the file of that name can't be removed, nor replaced.
+    fn check_removable(&self, db: &mut PgConnection, name: &str) -> impl Future<Output = Result<()>> + Send;
+}
+
+/// All files of an owner, by name.
+pub(crate) async fn list(db: &mut PgConnection, owner_id: Uuid) -> Result<Vec<File>> {
     Ok(sqlx::query_as(
         "SELECT name, role, media_type, bytes, blake3, uploaded_at, store_key FROM files
          WHERE session_id = $1 OR motion_database_id = $1 OR body_model_id = $1 ORDER BY name COLLATE \"C\"",
     )
-    .bind(owner)
+    .bind(owner_id)
     .fetch_all(db)
     .await?)
 }
 
-/// A file that is to come in.
-pub(super) struct Upload {
-    pub file_id: Uuid,
-    pub owner: Owner,
-    pub name: String,
-    pub role: FileRole,
-    pub key: Key,
+/// The same as jobs are given them.
+pub(crate) async fn inputs(db: &mut PgConnection, owner_id: Uuid) -> Result<Vec<InputFile>> {
+    let input = |file: File| {
+        Ok(InputFile {
+            name: file.name,
+            role: file.role,
+            store_key: file.store_key,
+            bytes: u64::try_from(file.bytes).map_err(|e| Error::Internal(e.to_string()))?,
+            blake3: file.blake3,
+        })
+    };
+    list(db, owner_id).await?.into_iter().map(input).collect()
 }
 
 /// Receives a file to its end, whether or not the caller waits for it, and records it.
-pub(super) async fn receive(
+pub(crate) async fn receive(
     app: App,
     project_id: Uuid,
-    upload: Upload,
+    owner: impl Owner,
+    (name, role): (String, FileRole),
     announced: Announced,
     body: Body,
 ) -> Result<(StatusCode, Json<File>)> {
     uninterrupted(async move {
-        let Upload { file_id, owner, name, role, key } = upload;
+        let id = Uuid::now_v7();
+        let key = owner.key(project_id, id);
         let stored = upload::receive(&app, &key, &announced, body).await?;
-        let new = NewFile { id: file_id, owner, name: &name, role, stored: &stored };
+        let new = NewFile { id, owner: &owner, name: &name, role, stored: &stored };
         let kept = keep(&app, project_id, &new).await;
         settle(&app, &key, kept).await
     })
     .await
 }
 
-/// Whose a file is.
-pub(super) enum Owner {
-    Session(Uuid),
-    MotionDatabase(Uuid),
-    BodyModel(Uuid),
-}
-
-struct NewFile<'a> {
+struct NewFile<'a, O> {
     id: Uuid,
-    owner: Owner,
+    owner: &'a O,
     name: &'a str,
     role: FileRole,
     stored: &'a Stored,
 }
 
 /// Records an uploaded object as a file; gives the key of the object that it replaces.
-async fn keep(app: &App, project_id: Uuid, new: &NewFile<'_>) -> Result<(File, Option<String>)> {
+async fn keep<O: Owner>(app: &App, project_id: Uuid, new: &NewFile<'_, O>) -> Result<(File, Option<String>)> {
     let mut tx = app.db.begin().await?;
-    let replaced = take_out(&mut tx, project_id, &new.owner, new.name).await?;
-    let (session_id, motion_database_id, body_model_id) = match new.owner {
-        Owner::Session(id) => (Some(id), None, None),
-        Owner::MotionDatabase(id) => (None, Some(id), None),
-        Owner::BodyModel(id) => (None, None, Some(id)),
-    };
+    let replaced = take_out(&mut tx, project_id, new.owner, new.name).await?;
     let bytes = i64::try_from(new.stored.bytes).map_err(|e| Error::Internal(e.to_string()))?;
     let file = sqlx::query_as(
         "INSERT INTO files (id, project_id, session_id, motion_database_id, body_model_id, name, role, media_type, store_key,
                             bytes, blake3)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11)
+         VALUES ($1, $2, CASE $3 WHEN 'sessions' THEN $4 END, CASE $3 WHEN 'motion_databases' THEN $4 END,
+                 CASE $3 WHEN 'body_models' THEN $4 END, $5, $6, $7, $8, $9, $10)
          RETURNING name, role, media_type, bytes, blake3, uploaded_at, store_key",
     )
     .bind(new.id)
     .bind(project_id)
-    .bind(session_id)
-    .bind(motion_database_id)
-    .bind(body_model_id)
+    .bind(O::TABLE)
+    .bind(new.owner.id())
     .bind(new.name)
     .bind(new.role.as_str())
     .bind(names::media_type(new.name))
@@ -159,79 +169,41 @@ async fn settle(
 }
 
 /// Removes a file, whether or not the caller waits for it.
-pub(super) async fn remove(app: App, project_id: Uuid, owner: Owner, name: String) -> Result<StatusCode> {
-    uninterrupted(async move { take_away(&app, project_id, &owner, &name).await }).await
+pub(crate) async fn remove(
+    app: App,
+    project_id: Uuid,
+    owner: impl Owner,
+    name: String,
+) -> Result<StatusCode> {
+    uninterrupted(async move {
+        let mut tx = app.db.begin().await?;
+        let removed = take_out(&mut tx, project_id, &owner, &name).await?;
+        tx.commit().await?;
+        let key = removed.ok_or_else(|| Error::not_found("file", name))?;
+        app.store.delete(&key.parse()?).await?;
+        Ok(StatusCode::NO_CONTENT)
+    })
+    .await
 }
 
-async fn take_away(app: &App, project_id: Uuid, owner: &Owner, name: &str) -> Result<StatusCode> {
-    let mut tx = app.db.begin().await?;
-    let removed = take_out(&mut tx, project_id, owner, name).await?;
-    tx.commit().await?;
-    let key = removed.ok_or_else(|| Error::not_found("file", name))?;
-    app.store.delete(&key.parse()?).await?;
-    Ok(StatusCode::NO_CONTENT)
-}
-
-/// Locks the owner and takes the file's row out, if its owner's state allows; gives the key of its object.
+/// Locks the owner and takes the file's row out, if its owner allows; gives the key of its object.
 async fn take_out(
     db: &mut PgConnection,
     project_id: Uuid,
-    owner: &Owner,
+    owner: &impl Owner,
     name: &str,
 ) -> Result<Option<String>> {
-    let id = match owner {
-        Owner::Session(id) => {
-            lookup::session(db, project_id, *id, Lock::Update).await?;
-            *id
-        }
-        Owner::MotionDatabase(id) => {
-            let database =
-                lookup::motion_database(db, project_id, &id.to_string(), Latest::Any, Lock::Update).await?;
-            check_collects(&database)?;
-            *id
-        }
-        Owner::BodyModel(id) => {
-            let model = body_models::find(db, project_id, &id.to_string(), Latest::Any, Lock::Update).await?;
-            check_collects_scans(&model)?;
-            *id
-        }
-    };
+    owner.lock(db, project_id).await?;
     let removed: Option<String> = sqlx::query_scalar(
         "DELETE FROM files WHERE (session_id = $1 OR motion_database_id = $1 OR body_model_id = $1) AND name = $2
          RETURNING store_key",
     )
-    .bind(id)
+    .bind(owner.id())
     .bind(name)
     .fetch_optional(&mut *db)
     .await?;
-    if let (Owner::Session(id), Some(_)) = (owner, &removed)
-        && lookup::active_runs_of_session(db, *id).await? > 0
-    {
-        return Err(Error::Conflict(format!(
-            "a run of this session goes on and reads {name:?}; cancel it first"
-        )));
+    if removed.is_some() {
+        owner.check_removable(db, name).await?;
     }
     Ok(removed)
-}
-
-/// Refuses to change the files of a database that is built from them.
-pub(super) fn check_collects(database: &MotionDatabase) -> Result<()> {
-    match database.state.as_str() {
-        "open" | "failed" => Ok(()),
-        state => Err(Error::Conflict(format!(
-            "motion database {}@{} is {state}: its files are fixed; make a new version",
-            database.name, database.version
-        ))),
-    }
-}
-
-/// The same for a body model.
-pub(super) fn check_collects_scans(model: &BodyModel) -> Result<()> {
-    match model.state.as_str() {
-        "open" | "failed" => Ok(()),
-        state => Err(Error::Conflict(format!(
-            "body model {}@{} is {state}: its files are fixed; make a new version",
-            model.name, model.version
-        ))),
-    }
 }

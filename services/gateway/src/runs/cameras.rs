@@ -1,0 +1,142 @@
+use std::collections::BTreeMap;
+
+use formats::FileRole;
+use jobs::{
+    InputFile, body_model::SHIPPED, inverse_kinematics::InverseKinematics, multi_view::PlanMultiView,
+};
+use multi_view::Parameters;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use sqlx::PgConnection;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::{session_run::OnSession, units::check_unit};
+use crate::{
+    error::{Error, Result},
+    lock::Lock,
+    versioned::{self, BodyModel, Latest},
+};
+
+/// Most cameras, and most files whose camera is named.
+const MAX_NAMES: usize = 256;
+
+/// Which cameras are used, and how silhouettes are made of what they saw.
+#[derive(Debug, Default, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub(super) struct CameraFields {
+    /// cameras to use, by the calibration's names; all that have pictures when left out
+    #[schema(example = json!(["cam01", "cam02", "cam03"]))]
+    cameras: Vec<String>,
+    /// file, or `ARCHIVE/FOLDER` -> name of its camera, where names don't tell
+    #[schema(example = json!({"GX010042.MP4": "cam01"}))]
+    camera_files: BTreeMap<String, String>,
+    /// `auto` (the plate if there is one), `plate`, `adaptive` or `mixture`; `auto` when left out
+    #[schema(example = "auto")]
+    background: Option<String>,
+    /// metres of one unit of the calibration, where the file doesn't say it
+    #[schema(example = 0.001)]
+    metres_per_unit: Option<f64>,
+    /// further parameters, by name, among others: `track` (false: the body in the first frame alone), `first_frame`,
+    /// `num_frames`, `frame_rate` (where no video tells it), `chunk_frames` and `overlap_frames` (frames that are tracked in
+    /// one piece, and that it goes on into the next), `particles` (0: none), `iterations`, `prior` and `seed` of the search
+    /// for limbs that do not fit, `texture` (points are followed in the pictures), `overlay` (a video of each camera)
+    #[schema(example = json!({"chunk_frames": 150, "particles": 25}))]
+    parameters: Map<String, Value>,
+}
+
+impl CameraFields {
+    /// Refuses what makes no sense on any session.
+    pub fn check(&self) -> Result<()> {
+        if self.camera_files.len() > MAX_NAMES || self.cameras.len() > MAX_NAMES {
+            return Err(Error::Unprocessable(format!(
+                "cameras and camera_files have {} and {} names, expected at most {MAX_NAMES} each",
+                self.cameras.len(),
+                self.camera_files.len()
+            )));
+        }
+        check_unit("metres_per_unit", self.metres_per_unit)?;
+        self.resolve().map(drop)
+    }
+
+    /// The first field that is given, if any is.
+    pub fn first_given(&self) -> Result<Option<String>> {
+        let (given, default) = (serde_json::to_value(self)?, serde_json::to_value(Self::default())?);
+        let mut fields = given.as_object().into_iter().flatten();
+        Ok(fields.find(|(name, value)| default[*name] != **value).map(|(name, _)| name.clone()))
+    }
+
+    /// All parameters, those left out with their defaults.
+    fn resolve(&self) -> Result<Parameters> {
+        let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
+        let given = Value::Object(self.parameters.clone());
+        let mut parameters: Parameters = serde_json::from_value(given).map_err(|error| refuse(&error))?;
+        if let Some(kind) = &self.background {
+            parameters.background.model = serde_json::from_value(kind.as_str().into()).map_err(|_| {
+                Error::Unprocessable(format!(
+                    "background is {kind:?}, expected auto, plate, adaptive or mixture"
+                ))
+            })?;
+        }
+        parameters.check().map_err(|error| refuse(&error))?;
+        Ok(parameters)
+    }
+
+    /// The first job of a run that looks at cameras: a body is looked for in the silhouettes, or they are for inverse
+    /// kinematics.
+    pub fn plan(
+        self,
+        on: OnSession,
+        body_model: &BodyModel,
+        up: Option<model::Axis>,
+        inverse_kinematics: Option<InverseKinematics>,
+    ) -> Result<PlanMultiView> {
+        check_files(&on.files)?;
+        let parameters = self.resolve()?;
+        Ok(PlanMultiView {
+            session_id: on.session.id,
+            session_name: on.session.name,
+            body_model: body_model.ready()?,
+            files: on.files,
+            cameras: self.cameras,
+            camera_files: self.camera_files,
+            up,
+            metres_per_unit: self.metres_per_unit,
+            parameters,
+            inverse_kinematics,
+        })
+    }
+}
+
+/// The body model that a run names: the one that comes with the program when it names none.
+pub(super) async fn body_model(
+    db: &mut PgConnection,
+    project_id: Uuid,
+    which: Option<&str>,
+) -> Result<BodyModel> {
+    versioned::find(db, project_id, which.unwrap_or(SHIPPED), Latest::Ready, Lock::Share).await
+}
+
+/// Refuses a session without a calibration, or without anything that cameras saw.
+fn check_files(files: &[InputFile]) -> Result<()> {
+    let count = |role: FileRole| files.iter().filter(|file| file.role == role).count();
+    match count(FileRole::Calibration) {
+        1 => {}
+        0 => {
+            return Err(Error::Unprocessable(
+                "the session has no calibration; upload a .toml, .json, .yml, .xml or .qca.txt file of its cameras first".into(),
+            ));
+        }
+        found => {
+            return Err(Error::Unprocessable(format!(
+                "the session has {found} calibration files, expected one"
+            )));
+        }
+    }
+    if [FileRole::Video, FileRole::Images, FileRole::Masks].into_iter().all(|role| count(role) == 0) {
+        return Err(Error::Unprocessable(
+            "the session has no video, images or masks; upload what the cameras saw first".into(),
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,212 @@
+//! Runs by inverse kinematics: poses of a body whose measured points are reached.
+
+use formats::FileRole;
+use jobs::inverse_kinematics::{
+    BodyDescription, IkSolver, InverseKinematics, RUN_KIND, SolveInverseKinematics,
+};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use sqlx::PgConnection;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::{
+    cameras::{self, CameraFields},
+    enqueue::NewRun,
+    markers::MarkerFields,
+    session_run::{OnSession, SessionRun},
+};
+use crate::{
+    error::{Error, Result},
+    page::Item,
+};
+
+/// Most steps of one solve, and those when left out.
+const STEPS: (usize, usize) = (200, 15);
+/// Frames a second.
+const FRAME_RATES: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
+
+/// Poses of a body by inverse kinematics, from measured points and the silhouettes of any number of cameras.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InverseKinematicsRun {
+    /// the solver and the body
+    #[serde(default)]
+    inverse_kinematics: InverseKinematicsRequest,
+    /// the body model, by id, `name` (its latest version that is ready) or `name@version`; `shipped`, the one that comes
+    /// with the program, when left out
+    #[schema(example = "shipped")]
+    body_model: Option<String>,
+    /// the axis of a TRC or C3D file, and of a calibration's world, that points up: `x`, `y` or `z`; what the files say when
+    /// left out
+    #[schema(value_type = Option<String>, example = "z")]
+    up: Option<model::Axis>,
+    #[serde(flatten)]
+    #[schema(inline)]
+    markers: MarkerFields,
+    #[serde(flatten)]
+    #[schema(inline)]
+    cameras: CameraFields,
+}
+
+/// How poses are solved by inverse kinematics, and for whom.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InverseKinematicsRequest {
+    /// `plain` (measured points alone), `priority` (then a neutral posture), `image-constrained` (measured points, silhouettes in
+    /// their null space), `extended` (both in one Jacobian), `image-first`, or `reach-then-image-then-posture`; when left out
+    /// `image-constrained` if the session has cameras, else `priority`
+    #[schema(example = "image-constrained")]
+    solver: Option<String>,
+    /// most steps of one solve, 1 to 200; 15 when left out
+    #[schema(example = 15)]
+    steps: Option<usize>,
+    /// frames a second that are solved; the cameras', or else those of the file of points, when left out
+    #[schema(example = 30.0)]
+    frame_rate: Option<f64>,
+    /// metres; the mean of the body model when left out, as all that describes the body
+    #[schema(example = 1.78)]
+    stature_m: Option<f64>,
+    /// kilograms
+    #[schema(example = 74.0)]
+    mass_kg: Option<f64>,
+    /// years
+    #[schema(example = 31.0)]
+    age_years: Option<f64>,
+    /// `female` or `male`
+    #[schema(example = "female")]
+    sex: Option<String>,
+    /// coefficients of the body model, standard deviations, as in `shape.json`; instead of measurements
+    #[serde(default)]
+    alpha: Vec<f64>,
+}
+
+impl SessionRun for InverseKinematicsRun {
+    const KIND: &'static str = RUN_KIND;
+    const IMPLIED_BY: Option<&'static str> = Some("inverse_kinematics");
+
+    fn example() -> Value {
+        json!({
+            "kind": "inverse-kinematics",
+            "inverse_kinematics": {
+                "solver": "image-constrained",
+                "frame_rate": 30.0,
+                "stature_m": 1.78,
+                "mass_kg": 74.0,
+                "sex": "female",
+            },
+            "marker_set": "auto",
+            "cameras": ["cam01", "cam02"],
+        })
+    }
+
+    fn check(&self) -> Result<()> {
+        self.inverse_kinematics.check()?;
+        self.markers.check()?;
+        self.cameras.check()
+    }
+
+    async fn plan(self, db: &mut PgConnection, project_id: Uuid, on: OnSession) -> Result<NewRun> {
+        let solver = self.inverse_kinematics.solver_for(&on)?;
+        if !on.has(FileRole::ControlPoints) {
+            return Err(Error::Unprocessable(
+                "the session has no measured points; upload a .csv, .trc or .c3d file first".into(),
+            ));
+        }
+        let markers = self.markers;
+        let how = InverseKinematics {
+            points: markers.points,
+            mapping: markers.mapping,
+            marker_set: markers.marker_set,
+            marker_map: markers.marker_map,
+            marker_prefix: markers.marker_prefix,
+            ..self.inverse_kinematics.resolve(solver)
+        };
+        let session_id = on.session.id;
+        if !solver.uses_images()
+            && let Some(field) = self.cameras.first_given()?
+        {
+            return Err(Error::Unprocessable(format!(
+                "{field} is for runs that look at cameras, and this one looks at none; upload a calibration and what they \
+                 saw, or leave it out"
+            )));
+        }
+        let body_model = cameras::body_model(db, project_id, self.body_model.as_deref()).await?;
+        let run = if solver.uses_images() {
+            let plan = self.cameras.plan(on, &body_model, self.up, Some(how))?;
+            NewRun::new(RUN_KIND, &plan)?
+        } else {
+            let solve = SolveInverseKinematics {
+                session_id,
+                session_name: on.session.name,
+                body_model: body_model.ready()?,
+                files: on.files,
+                up: self.up,
+                how,
+                cameras: None,
+            };
+            NewRun::new(RUN_KIND, &solve)?
+        };
+        Ok(run.on_session(session_id).with_body_model(body_model.id()))
+    }
+}
+
+impl InverseKinematicsRequest {
+    fn check(&self) -> Result<()> {
+        let refuse = |what: String| Err(Error::Unprocessable(what));
+        self.solver()?;
+        if let Some(steps) = self.steps.filter(|steps| !(1..=STEPS.0).contains(steps)) {
+            return refuse(format!("steps is {steps}, expected 1 to {}", STEPS.0));
+        }
+        if let Some(rate) = self.frame_rate.filter(|rate| !FRAME_RATES.contains(rate)) {
+            return refuse(format!("frame_rate is {rate}, expected 1 to 1000"));
+        }
+        if let Some(sex) = self.sex.as_deref().filter(|sex| !["female", "male"].contains(sex)) {
+            return refuse(format!("sex is {sex:?}, expected female or male"));
+        }
+        Ok(())
+    }
+
+    fn solver(&self) -> Result<Option<IkSolver>> {
+        let Some(name) = &self.solver else { return Ok(None) };
+        serde_json::from_value(name.as_str().into()).map(Some).map_err(|_| {
+            Error::Unprocessable(format!(
+                "solver is {name:?}, expected plain, priority, image-constrained, extended, image-first or \
+                 reach-then-image-then-posture"
+            ))
+        })
+    }
+
+    /// The solver that is named, or the one that suits the session's files.
+    fn solver_for(&self, on: &OnSession) -> Result<IkSolver> {
+        let has_cameras = on.has(FileRole::Calibration)
+            && [FileRole::Video, FileRole::Images, FileRole::Masks].into_iter().any(|role| on.has(role));
+        match self.solver()? {
+            None if has_cameras => Ok(IkSolver::ImageConstrained),
+            None => Ok(IkSolver::Priority),
+            Some(solver) if solver.uses_images() && !has_cameras => Err(Error::Unprocessable(format!(
+                "solver is {:?}, which needs silhouettes; upload a calibration and what the cameras saw, or choose plain or \
+                 priority",
+                self.solver.as_deref().unwrap_or_default()
+            ))),
+            Some(solver) => Ok(solver),
+        }
+    }
+
+    /// Everything resolved, but for points and markers.
+    fn resolve(self, solver: IkSolver) -> InverseKinematics {
+        InverseKinematics {
+            solver,
+            steps: self.steps.unwrap_or(STEPS.1),
+            frame_rate: self.frame_rate,
+            body: BodyDescription {
+                alpha: self.alpha,
+                stature_m: self.stature_m,
+                mass_kg: self.mass_kg,
+                age_years: self.age_years,
+                sex: self.sex,
+            },
+            ..InverseKinematics::default()
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Runs: what they are asked for by, one request type a kind; how they are started, and how they stand.
+
+mod body_model;
+mod build;
+mod cameras;
+pub(crate) mod enqueue;
+mod inverse_kinematics;
+mod markers;
+mod motion_database;
+mod multi_view;
+pub(crate) mod request;
+pub(crate) mod run;
+pub(crate) mod session_run;
+mod sparse;
+mod training;
+mod units;
+
+pub(crate) use body_model::NewBodyModelBuild;
+pub(crate) use build::build;
+pub(crate) use motion_database::NewBuild;
+pub(crate) use run::{Run, RunWithJobs};
+pub(crate) use sparse::resolve_parameters;
+pub(crate) use training::{NewTraining, train};
+
+use session_run::Kind;
+
+/// The kinds of runs on sessions: another one is a file and a line here.
+const KINDS: &[Kind] = &[
+    Kind::new::<sparse::SparseRun>(),
+    Kind::new::<multi_view::MultiViewRun>(),
+    Kind::new::<inverse_kinematics::InverseKinematicsRun>(),
+];

@@ -1,0 +1,181 @@
+//! What a kind of runs on sessions is, and a line of their table.
+
+use std::borrow::Cow;
+
+use formats::FileRole;
+use futures::future::BoxFuture;
+use jobs::InputFile;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+use sqlx::PgConnection;
+use utoipa::{
+    ToSchema,
+    openapi::{
+        AllOfBuilder, Object, ObjectBuilder, RefOr, Schema,
+        schema::{AdditionalProperties, AnyOfBuilder, SchemaType, Type},
+    },
+};
+use uuid::Uuid;
+
+use super::enqueue::NewRun;
+use crate::{
+    error::{Error, Result},
+    sessions::Session,
+};
+
+/// A session that a run is started on.
+#[derive(Debug)]
+pub(crate) struct OnSession {
+    /// the session
+    pub session: Session,
+    /// its files, in order of name
+    pub files: Vec<InputFile>,
+}
+
+impl OnSession {
+    /// Whether there is a file of that role.
+    pub fn has(&self, role: FileRole) -> bool {
+        self.files.iter().any(|file| file.role == role)
+    }
+}
+
+/// The request of one kind of runs on sessions.
+pub(super) trait SessionRun: DeserializeOwned + ToSchema + Send + 'static {
+    /// The kind, as requests name it.
+    const KIND: &'static str;
+
+    /// The files that make it the kind of a session's runs where none is named, and how messages call them.
+    const FILES: Option<(FileRole, &'static str)> = None;
+
+    /// The field that makes it the kind where none is named.
+    const IMPLIED_BY: Option<&'static str> = None;
+
+    /// A request as people may send it.
+    fn example() -> Value;
+
+    /// Refuses what makes no sense on any session.
+    fn check(&self) -> Result<()>;
+
+    /// The run: everything that decides its result.
+    fn plan(
+        self,
+        db: &mut PgConnection,
+        project_id: Uuid,
+        on: OnSession,
+    ) -> impl Future<Output = Result<NewRun>> + Send;
+}
+
+/// A request that was read as one of its kind.
+pub(super) trait Asked: Send {
+    /// [`SessionRun::plan`].
+    fn plan<'a>(
+        self: Box<Self>,
+        db: &'a mut PgConnection,
+        project_id: Uuid,
+        on: OnSession,
+    ) -> BoxFuture<'a, Result<NewRun>>;
+}
+
+impl<R: SessionRun> Asked for R {
+    fn plan<'a>(
+        self: Box<Self>,
+        db: &'a mut PgConnection,
+        project_id: Uuid,
+        on: OnSession,
+    ) -> BoxFuture<'a, Result<NewRun>> {
+        Box::pin(SessionRun::plan(*self, db, project_id, on))
+    }
+}
+
+/// A line of the table of kinds.
+#[derive(Debug)]
+pub(super) struct Kind {
+    /// as requests name it
+    pub name: &'static str,
+    /// [`SessionRun::FILES`]
+    pub files: Option<(FileRole, &'static str)>,
+    /// [`SessionRun::IMPLIED_BY`]
+    pub implied_by: Option<&'static str>,
+    /// [`SessionRun::example`]
+    pub example: fn() -> Value,
+    /// its fields as OpenAPI has them
+    pub object: fn() -> Object,
+    /// what its fields refer to, by name
+    pub referred: fn(&mut Vec<(String, RefOr<Schema>)>),
+    /// its name in OpenAPI
+    pub schema_name: fn() -> Cow<'static, str>,
+    read: Reader,
+}
+
+/// What reads a request of one kind.
+type Reader = fn(Map<String, Value>) -> Result<Box<dyn Asked>>;
+
+impl Kind {
+    /// The line of a kind.
+    pub const fn new<R: SessionRun>() -> Self {
+        Self {
+            name: R::KIND,
+            files: R::FILES,
+            implied_by: R::IMPLIED_BY,
+            example: R::example,
+            object: object::<R>,
+            referred: R::schemas,
+            schema_name: R::name,
+            read: read::<R>,
+        }
+    }
+
+    /// Reads a request of this kind, whose fields are known to be its.
+    pub fn read(&self, fields: Map<String, Value>) -> Result<Box<dyn Asked>> {
+        (self.read)(fields)
+    }
+
+    /// As OpenAPI has it: `kind` may be left out, but where only a field of its own implies it, one of the two is there.
+    pub fn schema(&self) -> Schema {
+        let object = (self.object)();
+        let Some(field) = self.implied_by else { return object.into() };
+        let has = |name: &str| ObjectBuilder::new().required(name);
+        AllOfBuilder::new()
+            .description(object.description.clone())
+            .examples(object.examples.clone())
+            .item(object)
+            .item(AnyOfBuilder::new().item(has("kind")).item(has(field)))
+            .into()
+    }
+}
+
+fn read<R: SessionRun>(fields: Map<String, Value>) -> Result<Box<dyn Asked>> {
+    let asked: R = serde_json::from_value(Value::Object(fields))
+        .map_err(|error| Error::Unprocessable(format!("request of kind {}: {error}", R::KIND)))?;
+    asked.check()?;
+    Ok(Box::new(asked))
+}
+
+fn object<R: SessionRun>() -> Object {
+    let mut object = merged(R::schema());
+    let kind = ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::String))
+        .enum_values(Some([R::KIND]))
+        .description(Some("what kind of run it is; what the session's files are for when left out"));
+    object.properties.insert("kind".to_owned(), RefOr::T(kind.into()));
+    object.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));
+    object.examples = vec![R::example()];
+    object
+}
+
+/// One object with the fields of all objects that a request is composed of.
+fn merged(schema: RefOr<Schema>) -> Object {
+    match schema {
+        RefOr::T(Schema::Object(object)) => object,
+        RefOr::T(Schema::AllOf(all)) => {
+            let mut sum = Object::new();
+            sum.description = all.description;
+            for part in all.items.into_iter().map(merged) {
+                sum.properties.extend(part.properties);
+                sum.required.extend(part.required);
+            }
+            sum
+        }
+        _ => Object::default(),
+    }
+}

@@ -1,0 +1,90 @@
+//! Capture sessions in the database, found in the caller's project only: what another project has is not there.
+
+use chrono::{DateTime, Utc};
+use serde::Serialize;
+use sqlx::PgConnection;
+use store::Key;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use crate::{
+    error::{Error, Result},
+    files::Owner,
+    lock::Lock,
+    page::Item,
+};
+
+/// A capture session.
+#[derive(Debug, Serialize, ToSchema, sqlx::FromRow)]
+pub(crate) struct Session {
+    /// id
+    pub id: Uuid,
+    /// name given by the user
+    #[schema(example = "walk, take 3")]
+    pub name: String,
+    /// words to find it by
+    pub tags: Vec<String>,
+    /// when it was made
+    pub created_at: DateTime<Utc>,
+}
+
+impl Item for Session {
+    fn id(&self) -> Uuid {
+        self.id
+    }
+}
+
+/// The session of that id in the project.
+pub(crate) async fn find(db: &mut PgConnection, project_id: Uuid, id: Uuid, lock: Lock) -> Result<Session> {
+    sqlx::query_as(match lock {
+        Lock::None => "SELECT id, name, tags, created_at FROM sessions WHERE id = $1 AND project_id = $2",
+        Lock::Share => {
+            "SELECT id, name, tags, created_at FROM sessions WHERE id = $1 AND project_id = $2 FOR SHARE"
+        }
+        Lock::Update => {
+            "SELECT id, name, tags, created_at FROM sessions WHERE id = $1 AND project_id = $2 FOR UPDATE"
+        }
+    })
+    .bind(id)
+    .bind(project_id)
+    .fetch_optional(db)
+    .await?
+    .ok_or_else(|| Error::not_found("session", id))
+}
+
+/// How many runs of a session are under way.
+pub(crate) async fn count_active_runs(db: &mut PgConnection, session_id: Uuid) -> Result<i64> {
+    Ok(sqlx::query_scalar("SELECT count(*) FROM runs WHERE session_id = $1 AND finished_at IS NULL")
+        .bind(session_id)
+        .fetch_one(db)
+        .await?)
+}
+
+/// A session as the owner of files: they may always be added to, but not taken from under a run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SessionFiles(pub Uuid);
+
+impl Owner for SessionFiles {
+    const TABLE: &'static str = "sessions";
+
+    fn id(&self) -> Uuid {
+        self.0
+    }
+
+    fn key(&self, project_id: Uuid, file_id: Uuid) -> Key {
+        store::key::file(project_id, self.0, file_id)
+    }
+
+    async fn lock(&self, db: &mut PgConnection, project_id: Uuid) -> Result<()> {
+        find(db, project_id, self.0, Lock::Update).await.map(drop)
+    }
+
+    async fn check_removable(&self, db: &mut PgConnection, name: &str) -> Result<()> {
+        if count_active_runs(db, self.0).await? > 0 {
+            return Err(Error::Conflict(format!(
+                "a run of this session is under way and reads {name:?}; cancel it first"
+            )));
+        }
+        Ok(())
+    }
+}

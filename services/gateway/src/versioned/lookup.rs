@@ -1,0 +1,60 @@
+//! Finding what a request names, in the caller's project only: what another project has is not there.
+
+use sqlx::PgConnection;
+use uuid::Uuid;
+
+use super::noun::Versioned;
+use crate::{
+    access::Access,
+    error::{Error, Result},
+    lock::Lock,
+};
+
+/// Which versions of a name are meant when none is named.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Latest {
+    /// the newest
+    Any,
+    /// the newest that is ready, or else the newest
+    Ready,
+}
+
+/// What `which` names: an id, `name@version`, or a name, which stands for its latest version.
+pub(crate) async fn find<V: Versioned>(
+    db: &mut PgConnection,
+    project_id: Uuid,
+    which: &str,
+    latest: Latest,
+    lock: Lock,
+) -> Result<V> {
+    if let Some(shipped) = V::shipped().filter(|shipped| shipped.version().is_named(which)) {
+        return Ok(shipped);
+    }
+    let not_found = || Error::not_found(V::NOUN.name, which);
+    let id = match (Uuid::try_parse(which), which.rsplit_once('@')) {
+        (Ok(id), _) => Some(id),
+        (Err(_), Some((name, version))) => {
+            let version: i32 = version.parse().map_err(|_| not_found())?;
+            let query =
+                sqlx::query_scalar(V::NOUN.sql.find_version).bind(project_id).bind(name).bind(version);
+            query.fetch_optional(&mut *db).await?
+        }
+        (Err(_), None) => {
+            let is_ready_wanted = latest == Latest::Ready;
+            let query = sqlx::query_scalar(V::NOUN.sql.find_latest);
+            query.bind(project_id).bind(which).bind(is_ready_wanted).fetch_optional(&mut *db).await?
+        }
+    };
+    let query = match lock {
+        Lock::None => V::NOUN.sql.find,
+        Lock::Share => V::NOUN.sql.find_for_share,
+        Lock::Update => V::NOUN.sql.find_for_update,
+    };
+    sqlx::query_as(query).bind(id).bind(project_id).fetch_optional(db).await?.ok_or_else(not_found)
+}
+
+/// The same for a caller who only looks.
+pub(crate) async fn look<V: Versioned>(by: &Access, which: &str, latest: Latest) -> Result<V> {
+    let mut db = by.app.db.acquire().await?;
+    find(&mut db, by.caller.project_id, which, latest, Lock::None).await
+}

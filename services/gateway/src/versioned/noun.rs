@@ -1,0 +1,153 @@
+//! What a noun has to say to be versioned.
+
+use std::fmt;
+
+use chrono::{DateTime, Utc};
+use formats::FileRole;
+use serde::{Serialize, de::DeserializeOwned};
+use sqlx::PgConnection;
+use store::Key;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::sql::Sql;
+use crate::{
+    error::{Error, Result},
+    page::Item,
+};
+
+/// What makes a noun of the mechanism.
+#[derive(Debug)]
+pub(crate) struct Noun {
+    /// what people call it
+    pub name: &'static str,
+    /// path of all of them
+    pub path: &'static str,
+    /// the statements on its table
+    pub sql: Sql,
+    /// what builds of it call it, in their parameters
+    pub parameter: &'static str,
+    /// kinds of runs that are of no use when it is deleted
+    pub runs: &'static [&'static str],
+    /// role of the files that it is built from
+    pub role: FileRole,
+    /// whether it can be built from a file of that name
+    pub takes: fn(&str) -> bool,
+    /// the files that it can be built from, in words
+    pub takes_what: &'static str,
+    /// what it is best built from
+    pub sources: &'static str,
+    /// where a file to build it from is stored, by its id and the file's
+    pub input: fn(Uuid, Uuid) -> Key,
+    /// where all that belongs to it is stored
+    pub prefix: fn(Uuid) -> Key,
+}
+
+/// One version of one name.
+#[derive(Debug, Clone, Serialize, ToSchema, sqlx::FromRow)]
+pub(crate) struct Version {
+    /// id; all zeros for what comes with the program
+    pub id: Uuid,
+    /// name in the project
+    #[schema(example = "walks")]
+    pub name: String,
+    /// version of that name, from 1
+    #[schema(example = 1)]
+    pub version: i32,
+    /// `open` (collects files), `building`, `ready`, or `failed` (collects files again)
+    #[schema(example = "ready")]
+    pub state: String,
+    /// the run that builds or built it
+    pub build_run_id: Option<Uuid>,
+    /// size of what was built, bytes
+    pub bytes: Option<i64>,
+    /// BLAKE3 of what was built, hexadecimal: of its file, or of the list of its shards
+    pub blake3: Option<String>,
+    /// when it was made; null for what comes with the program
+    pub created_at: Option<DateTime<Utc>>,
+    /// when it became ready
+    pub ready_at: Option<DateTime<Utc>>,
+    /// where its file, or the list of its shards, is in the object store
+    #[serde(skip)]
+    pub store_key: Option<String>,
+}
+
+impl Version {
+    /// Whether files may be added to it and taken from it, and it can be built.
+    pub fn collects(&self) -> bool {
+        matches!(self.state.as_str(), "open" | "failed")
+    }
+
+    /// Whether it comes with the program.
+    pub fn is_shipped(&self) -> bool {
+        self.id.is_nil()
+    }
+
+    /// Whether that is its id, its name or `name@version`.
+    pub fn is_named(&self, which: &str) -> bool {
+        which == self.name
+            || which == self.to_string()
+            || Uuid::try_parse(which).is_ok_and(|id| id == self.id)
+    }
+}
+
+impl fmt::Display for Version {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}@{}", self.name, self.version)
+    }
+}
+
+/// A row of a table of versioned things.
+pub(crate) trait Versioned: Item + Serialize + Sync + 'static {
+    /// What it is.
+    const NOUN: Noun;
+
+    /// A request to make one.
+    type New: DeserializeOwned + Send + Sync;
+
+    /// What all nouns have in common.
+    fn version(&self) -> &Version;
+
+    /// The one that comes with the program and has no row, if there is one.
+    fn shipped() -> Option<Self> {
+        None
+    }
+
+    /// The name that a request asks for; refuses a request that makes no sense, whatever there is already.
+    fn check(new: &Self::New) -> Result<&str>;
+
+    /// Adds the row of that id, the next version of its name.
+    fn insert(
+        db: &mut PgConnection,
+        project_id: Uuid,
+        id: Uuid,
+        new: &Self::New,
+    ) -> impl Future<Output = Result<()>> + Send;
+
+    /// The BLAKE3 of what was built.
+    ///
+    /// # Errors
+    /// 409 with its state and what to do, if it is not ready.
+    fn blake3(&self) -> Result<&str> {
+        let version = self.version();
+        version.blake3.as_deref().ok_or_else(|| {
+            let what_to_do = match version.state.as_str() {
+                "open" => format!("upload {} to it and build it", Self::NOUN.sources),
+                "building" => "wait for its build".to_owned(),
+                _ => "see the error of its build".to_owned(),
+            };
+            Error::Conflict(format!("{} is {}, expected ready: {what_to_do}", self.title(), version.state))
+        })
+    }
+
+    /// What messages call it: `motion database walks@1`.
+    fn title(&self) -> String {
+        format!("{} {}", Self::NOUN.name, self.version())
+    }
+}
+
+/// Records the run that builds it.
+pub(crate) async fn set_build<V: Versioned>(db: &mut PgConnection, row: &V, run_id: Uuid) -> Result<()> {
+    sqlx::query(V::NOUN.sql.set_build).bind(row.id()).bind(run_id).execute(db).await?;
+    Ok(())
+}

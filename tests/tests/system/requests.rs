@@ -1,0 +1,171 @@
+//! What runs on sessions are asked for by: one request a kind.
+
+use anyhow::{Context, Result};
+use serde_json::{Value, json};
+use tests::{Api, System};
+
+const POINTS: (&str, &[u8]) = ("points.csv", b"time,a_x,a_y,a_z\n0,0,0,0\n");
+const CALIBRATION: (&str, &[u8]) = ("calibration.json", b"{}");
+const MASKS: (&str, &[u8]) = ("silhouettes.tar", b"x");
+
+/// Posts a request for a run; status and, of a refusal, its words, of a run, its kind.
+fn ask(api: &Api, session: &str, request: &Value) -> Result<(u16, String)> {
+    let answer = api.post(&format!("{session}/runs"), request)?;
+    let json = answer.json();
+    let word = if answer.status == 202 { &json["kind"] } else { &json["detail"] };
+    if let Some(id) = json["id"].as_str() {
+        api.make(&format!("/v1/runs/{id}/cancel"), &json!({}))?;
+    }
+    Ok((answer.status, word.as_str().unwrap_or_default().to_owned()))
+}
+
+#[test]
+fn a_field_that_no_kind_has_is_refused_by_every_kind() -> Result<()> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    let session = api.session("s", &[POINTS, CALIBRATION, MASKS])?;
+    for (kind, field) in [
+        ("sparse", "motion_database"),
+        ("multi-view", "background"),
+        ("inverse-kinematics", "inverse_kinematics"),
+    ] {
+        for value in [json!("red"), Value::Null] {
+            let (status, detail) = ask(&api, &session, &json!({"kind": kind, "colour": value}))?;
+            assert_eq!(status, 422, "{kind}");
+            assert!(
+                detail.contains(&format!("colour is not a field of {kind} runs; they have: ")),
+                "{detail}"
+            );
+            assert!(detail.contains(field), "{detail}");
+        }
+    }
+    let (status, detail) = ask(
+        &api,
+        &session,
+        &json!({"kind": "inverse-kinematics", "inverse_kinematics": {"solve": "plain"}}),
+    )?;
+    assert!(status == 422 && detail.contains("solve"), "{status} {detail}");
+    Ok(())
+}
+
+#[test]
+fn a_field_of_another_kind_is_refused_and_said_where_it_belongs() -> Result<()> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    let session = api.session("s", &[POINTS, CALIBRATION, MASKS])?;
+    for (kind, field, value, belongs) in [
+        ("sparse", "cameras", json!(["cam1"]), "multi-view and inverse-kinematics"),
+        ("sparse", "body_model", json!("shipped"), "multi-view and inverse-kinematics"),
+        ("sparse", "inverse_kinematics", json!({}), "inverse-kinematics"),
+        ("multi-view", "motion_database", json!("walks"), "sparse"),
+        ("multi-view", "points", json!(["head", "root"]), "sparse and inverse-kinematics"),
+        ("multi-view", "marker_map", json!("x"), "sparse and inverse-kinematics"),
+        ("inverse-kinematics", "neighbours", json!(3), "sparse"),
+        ("inverse-kinematics", "bvh_metres_per_unit", json!(1.0), "sparse"),
+    ] {
+        let (status, detail) = ask(&api, &session, &json!({"kind": kind, field: value}))?;
+        assert_eq!(status, 422, "{kind} {field}");
+        let expected = format!("{field} is not a field of {kind} runs, but of {belongs} runs; they have: ");
+        assert!(detail.starts_with(&expected), "{kind} {field}: {detail}");
+    }
+    // what is null is left out
+    let (status, kind) = ask(&api, &session, &json!({"kind": "multi-view", "motion_database": null}))?;
+    assert_eq!((status, kind.as_str()), (202, "multi-view"));
+    Ok(())
+}
+
+#[test]
+fn the_kind_follows_from_the_files_when_it_is_left_out() -> Result<()> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    let none = api.session("none", &[])?;
+    let points = api.session("points", &[POINTS])?;
+    let cameras = api.session("cameras", &[CALIBRATION, MASKS])?;
+    let both = api.session("both", &[POINTS, CALIBRATION, MASKS])?;
+    for (session, request, status, expected) in [
+        (&none, json!({}), 422, "the session has neither control points nor cameras; upload"),
+        (&none, json!({"motion_database": "walks"}), 404, "no motion database \"walks\""),
+        (&none, json!({"kind": "multi-view"}), 422, "the session has no calibration"),
+        (&none, json!({"kind": "inverse-kinematics"}), 422, "the session has no measured points"),
+        (&points, json!({}), 422, "missing field `motion_database`"),
+        (&points, json!({"motion_database": "walks"}), 404, "no motion database \"walks\""),
+        (&points, json!({"kind": null, "motion_database": "walks"}), 404, "no motion database \"walks\""),
+        (&points, json!({"cameras": ["cam1"]}), 422, "the session has control points, so kind is sparse"),
+        (&points, json!({"inverse_kinematics": {}}), 202, "inverse-kinematics"),
+        (
+            &points,
+            json!({"inverse_kinematics": {}, "motion_database": "walks"}),
+            422,
+            "inverse_kinematics is given",
+        ),
+        (&cameras, json!({}), 202, "multi-view"),
+        (
+            &cameras,
+            json!({"points": ["head", "root"]}),
+            422,
+            "the session has a calibration, so kind is multi-view",
+        ),
+        (&cameras, json!({"inverse_kinematics": {}}), 422, "the session has no measured points"),
+        (&both, json!({}), 422, "kind is required: sparse, multi-view or inverse-kinematics"),
+        (&both, json!({"motion_database": "walks"}), 422, "kind is required"),
+        (&both, json!({"kind": "sparse", "motion_database": "walks"}), 404, "no motion database \"walks\""),
+        (&both, json!({"kind": "multi-view"}), 202, "multi-view"),
+        (&both, json!({"inverse_kinematics": {}}), 202, "inverse-kinematics"),
+        (&both, json!({"kind": "inverse-kinematics"}), 202, "inverse-kinematics"),
+        (
+            &both,
+            json!({"kind": "dance"}),
+            422,
+            "kind is \"dance\", expected sparse, multi-view or inverse-kinematics",
+        ),
+        (&both, json!({"kind": 3}), 422, "kind is 3, expected"),
+    ] {
+        let (found, word) = ask(&api, session, &request)?;
+        assert_eq!(found, status, "{request}: {word}");
+        assert!(word.contains(expected), "{request}: {word}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_request_is_one_of_its_kinds_and_every_example_is_accepted_as_printed() -> Result<()> {
+    let api = crate::with_database();
+    let described = api.get("/openapi.json")?.json();
+    let content = &described["paths"]["/v1/sessions/{session_id}/runs"]["post"]["requestBody"]["content"]["application/json"];
+    let at = |reference: &Value| -> Result<Value> {
+        let path = reference["$ref"].as_str().context("no reference")?.trim_start_matches('#');
+        described.pointer(path).cloned().with_context(|| format!("{path} leads nowhere"))
+    };
+    let request = at(&content["schema"])?;
+    assert_eq!(request["discriminator"], Value::Null, "kind may be left out");
+    let mut kinds = Vec::new();
+    for one in request["oneOf"].as_array().context("not one of several")? {
+        let schema = at(one)?;
+        // one that has to be asked for says so beside its fields
+        let object = if schema["allOf"].is_array() { &schema["allOf"][0] } else { &schema };
+        assert_eq!(object["additionalProperties"], false, "{schema}");
+        let [kind] = &object["properties"]["kind"]["enum"].as_array().context("no kind")?[..] else {
+            anyhow::bail!("several kinds: {schema}");
+        };
+        let example = &content["examples"][kind.as_str().unwrap_or_default()]["value"];
+        assert_eq!((&example["kind"], &schema["examples"][0]), (kind, example));
+        for field in example.as_object().context("no example")?.keys() {
+            assert!(object["properties"][field].is_object(), "{kind} has no {field}");
+        }
+        kinds.push(kind.clone());
+    }
+    assert_eq!(kinds, ["sparse", "multi-view", "inverse-kinematics"]);
+    let examples = content["examples"].as_object().context("no examples")?;
+    assert_eq!(examples.len(), kinds.len());
+
+    let points = crate::points_csv(5, 240)?;
+    let session = api.session("s", &[("points.csv", points.as_bytes()), CALIBRATION, MASKS])?;
+    let empty = api.session("empty", &[])?;
+    for (kind, example) in examples {
+        let (status, word) = ask(api, &session, &example["value"])?;
+        assert_eq!(status, 202, "{kind}: {word}");
+        let (status, word) = ask(api, &empty, &example["value"])?;
+        assert!(status == 422 && word.contains("upload a "), "{kind}: {status} {word}");
+    }
+    Ok(())
+}
