@@ -7,7 +7,7 @@ use queue::Job;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use crate::{InputFile, JobReport, body_model::BodyModelFile, multi_view::CameraReport};
+use crate::{InputFile, JobReport, body_model::BodyModelFile};
 
 /// The kind of such runs.
 pub const RUN_KIND: &str = "inverse-kinematics";
@@ -119,16 +119,4 @@ pub struct CamerasPlanned {
     pub warnings: Vec<String>,
     /// What the plan itself took.
     pub plan: JobReport,
-}
-
-/// Frames a second at which all cameras recorded, if a file tells; with a warning where they differ.
-pub fn frame_rate(cameras: &[CameraReport], warnings: &mut Vec<String>) -> Option<f64> {
-    let mut known = cameras.iter().filter_map(|camera| Some((&camera.camera.name, camera.frame_rate?)));
-    let (first, rate) = known.next()?;
-    if let Some((other, found)) = known.find(|(_, found)| (found - rate).abs() > 0.01 * rate) {
-        warnings.push(format!(
-            "camera {other} has {found} frames a second, camera {first} {rate}: all are taken to have {rate}"
-        ));
-    }
-    Some(rate)
 }

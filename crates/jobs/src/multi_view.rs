@@ -13,7 +13,7 @@ use uuid::Uuid;
 
 pub use silhouettes::{
     CameraClips, CameraReport, ClipPlace, MakeSilhouettes, Members, Source, SourceKind, StoredClip,
-    clip_name, matches_name, picture_name, report_name,
+    clip_name, frame_rate, matches_name, picture_name, report_name,
 };
 pub use tracking::{DrawOverlay, FitShape, MergeTracks, TRACKED, TrackChunk, TrackingSession};
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use jobs::file_part;
 use tracking::Stage;
 
-use crate::results::Finished;
+use crate::finished::Finished;
 
 /// What a stage is called in tables.
 pub(crate) fn stage_name(stage: Stage) -> &'static str {

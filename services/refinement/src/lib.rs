@@ -12,6 +12,7 @@
 
 mod csv;
 mod error;
+mod finished;
 mod merge_job;
 mod options;
 mod refine;

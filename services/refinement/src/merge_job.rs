@@ -15,8 +15,9 @@ use tracking::{Chunk, Stage, hold_unseen, merge};
 
 use crate::{
     InputError, Shared,
-    report::{self, Meeting},
-    results::{EXPORTS, Finished},
+    finished::{Finished, Meeting},
+    report,
+    results::EXPORTS,
     track_job::{chunk_name, report_name},
 };
 

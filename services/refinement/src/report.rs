@@ -1,18 +1,13 @@
-//! What `run.json` says of a person who was followed, and what an animator should know of it.
+//! What `run.json` says about a person who was tracked, and what an animator should know of it.
 
 use body::Limb;
 use serde_json::{Value, json};
-use tracking::{Seam, Stage, Tracked};
+use tracking::{Stage, Tracked};
 
-use crate::{csv::stage_name, results::Finished};
-
-/// Where two chunks meet.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Meeting {
-    pub seam: Seam,
-    /// nobody was found by one of them in a frame that both have
-    pub is_blind: bool,
-}
+use crate::{
+    csv::stage_name,
+    finished::{Finished, Meeting},
+};
 
 /// Share of frames with a misaligned limb from which on a user had better look.
 const MANY: f64 = 0.05;

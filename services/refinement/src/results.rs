@@ -1,48 +1,8 @@
-//! The files that people get of a person who was followed.
+//! The files that people get of a person who was tracked.
 
-use std::sync::Arc;
+use body::Poses;
 
-use body::{BodyModel, Poses, Shape};
-use model::{Motion, PointTrajectories};
-use nalgebra::Vector3;
-use tracking::{Chunk, Stage};
-
-use crate::{InputError, csv, report::Meeting};
-
-/// A session that was followed from its first to its last frame.
-#[derive(Debug)]
-pub(crate) struct Finished {
-    pub model: Arc<BodyModel>,
-    pub shape: Shape,
-    /// all frames
-    pub tracked: Chunk,
-    /// where its chunks meet
-    pub meetings: Vec<Meeting>,
-    /// names, in the order of the overlaps
-    pub cameras: Vec<String>,
-    /// frames a second
-    pub frame_rate: f64,
-}
-
-impl Finished {
-    fn poses(&self) -> Vec<Vec<f64>> {
-        self.tracked.frames.iter().map(|tracked| tracked.pose.clone()).collect()
-    }
-
-    fn motion(&self) -> Result<Motion, InputError> {
-        Ok(self.model.motion(&self.shape, &self.poses(), self.frame_rate)?)
-    }
-
-    /// Centres of the joints; missing where nobody was found.
-    fn joints(&self) -> Result<PointTrajectories, InputError> {
-        let names = self.model.rig().joints().iter().map(|joint| joint.name.clone()).collect();
-        let positions = self.tracked.frames.iter().flat_map(|tracked| {
-            let is_seen = tracked.stage != Stage::Unseen;
-            tracked.joints.iter().map(move |joint| if is_seen { *joint } else { Vector3::repeat(f64::NAN) })
-        });
-        Ok(PointTrajectories::new(names, self.frame_rate, positions.collect())?)
-    }
-}
+use crate::{InputError, csv, finished::Finished};
 
 /// A result's name, its media type, and how it is written.
 pub(crate) struct Export {

@@ -100,6 +100,18 @@ pub struct CameraReport {
     pub job: JobReport,
 }
 
+/// Frames a second at which all cameras recorded, if a file tells; with a warning where they differ.
+pub fn frame_rate(cameras: &[CameraReport], warnings: &mut Vec<String>) -> Option<f64> {
+    let mut known = cameras.iter().filter_map(|camera| Some((&camera.camera.name, camera.frame_rate?)));
+    let (first, rate) = known.next()?;
+    if let Some((other, found)) = known.find(|(_, found)| (found - rate).abs() > 0.01 * rate) {
+        warnings.push(format!(
+            "camera {other} has {found} frames a second, camera {first} {rate}: all are taken to have {rate}"
+        ));
+    }
+    Some(rate)
+}
+
 /// One clip of silhouettes, or of points.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClipPlace {

@@ -8,8 +8,8 @@ use formats::FileRole;
 use inverse_kinematics::{Figure, sequence::Solved};
 use jobs::{
     InputFile,
-    inverse_kinematics::{SolveInverseKinematics, frame_rate},
-    multi_view::{CameraClips, CameraReport},
+    inverse_kinematics::SolveInverseKinematics,
+    multi_view::{CameraClips, CameraReport, frame_rate},
 };
 use kinematics::ControlPoint;
 use model::Motion;
