@@ -2,6 +2,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::extension::extension;
 use crate::session::{MotionFormat, PointsFormat, SkeletonFormat};
 
 /// What an uploaded file is for.
@@ -139,20 +140,6 @@ impl TryFrom<String> for FileRole {
     }
 }
 
-/// What a file's name says of its format: its extension in lower case, without `.zst` or `.gz` behind it; empty if there is
-/// none.
-pub(crate) fn extension(name: &str) -> String {
-    let lower = name.to_ascii_lowercase();
-    let inner = lower.strip_suffix(".zst").or(lower.strip_suffix(".gz")).unwrap_or(&lower);
-    let extension = match inner.rsplit_once('.') {
-        _ if inner.ends_with(".qca.txt") => "qca.txt",
-        Some((_, extension)) => extension,
-        None => return String::new(),
-    };
-    let has_stem = inner.len() > extension.len() + 1;
-    if has_stem { extension.to_owned() } else { String::new() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,13 +167,6 @@ mod tests {
         assert!(FileRole::is_motion_file("all.tgz"));
         assert!(!FileRole::is_motion_file("scan.obj"));
         assert!(!FileRole::is_motion_file("points.csv"));
-    }
-
-    #[test]
-    fn extensions_are_without_compression() {
-        assert_eq!(extension("16_15.AMC.zst"), "amc");
-        assert_eq!(extension("points"), "");
-        assert_eq!(extension(".qca.txt"), "");
     }
 
     #[test]

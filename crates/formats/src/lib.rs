@@ -21,6 +21,7 @@ pub mod c3d;
 pub mod calibration;
 mod error;
 mod euler;
+mod extension;
 mod file_role;
 mod frame_rate;
 pub mod glb;

@@ -2,7 +2,7 @@
 
 use model::PointTrajectories;
 
-use crate::{BvhOptions, PointsOptions, Read, Result, asf, bvh, c3d, file_role::extension, points_csv, trc};
+use crate::{BvhOptions, PointsOptions, Read, Result, asf, bvh, c3d, extension::extension, points_csv, trc};
 
 /// What the files do not say of themselves.
 #[derive(Debug, Clone, Copy, Default)]

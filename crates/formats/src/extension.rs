@@ -1,0 +1,25 @@
+/// What a file's name tells about its format: its extension in lower case, without `.zst` or `.gz` behind it; empty if there is
+/// none.
+pub(crate) fn extension(name: &str) -> String {
+    let lower = name.to_ascii_lowercase();
+    let inner = lower.strip_suffix(".zst").or(lower.strip_suffix(".gz")).unwrap_or(&lower);
+    let extension = match inner.rsplit_once('.') {
+        _ if inner.ends_with(".qca.txt") => "qca.txt",
+        Some((_, extension)) => extension,
+        None => return String::new(),
+    };
+    let has_stem = inner.len() > extension.len() + 1;
+    if has_stem { extension.to_owned() } else { String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn extensions_are_without_compression() {
+        assert_eq!(extension("16_15.AMC.zst"), "amc");
+        assert_eq!(extension("points"), "");
+        assert_eq!(extension(".qca.txt"), "");
+    }
+}
