@@ -1,8 +1,13 @@
 //! Files of a capture session: which reader they need, by what they are for and by their name.
 
-use model::PointTrajectories;
+use model::{Motion, PointTrajectories};
 
-use crate::{BvhOptions, PointsOptions, Read, Result, asf, bvh, c3d, extension::extension, points_csv, trc};
+use crate::{
+    BvhOptions, PointsOptions, Read, Result, amc, asf, bvh, c3d, extension::extension, points_csv, trc,
+};
+
+/// Frame rate of an AMC that does not state it when nothing else fits: CMU's, Hz.
+const AMC_FRAME_RATE: f64 = 120.0;
 
 /// What the files do not say of themselves.
 #[derive(Debug, Clone, Copy, Default)]
@@ -96,5 +101,46 @@ impl MotionFormat {
             "bvh" => Some(Self::Bvh),
             _ => None,
         }
+    }
+
+    /// Reads the file, unpacked. An AMC is on `skeleton`; the frame rate of one that does not state it is that under which it
+    /// takes about `seconds`.
+    ///
+    /// # Errors
+    /// Says where, what was found and what was expected.
+    pub fn read(
+        self,
+        bytes: &[u8],
+        skeleton: &asf::File,
+        seconds: f64,
+        options: &Options,
+    ) -> Result<Read<Motion>> {
+        if self == Self::Bvh {
+            return bvh::read(bytes, &options.bvh);
+        }
+        let Read { value, warnings } = amc::read(bytes, skeleton, AMC_FRAME_RATE)?;
+        let stated = amc::stated_frame_rate(bytes);
+        let rate = stated.unwrap_or_else(|| amc_frame_rate(value.num_frames(), seconds));
+        let value = Motion::new(skeleton.skeleton.clone(), rate, value.values().to_vec())?;
+        Ok(Read { value, warnings })
+    }
+}
+
+/// The usual rate under which so many frames take nearest to `seconds`, Hz; CMU's 120 where none comes near.
+fn amc_frame_rate(frames: usize, seconds: f64) -> f64 {
+    let off = |rate: &f64| (frames as f64 / rate / seconds.max(1e-9)).ln().abs();
+    let best = [120.0, 60.0, 30.0, 240.0, 100.0].into_iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    best.filter(|rate| off(rate) < 0.05).unwrap_or(AMC_FRAME_RATE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_of_an_amc_is_that_which_makes_it_as_long_as_the_session() {
+        assert_eq!(amc_frame_rate(1200, 10.0), 120.0);
+        assert_eq!(amc_frame_rate(601, 10.0), 60.0);
+        assert_eq!(amc_frame_rate(5, 10.0), 120.0);
     }
 }

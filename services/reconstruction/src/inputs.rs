@@ -13,12 +13,9 @@ use model::{Motion, PointTrajectories, Skeleton};
 use sparse::Session;
 use std::sync::Arc;
 
-/// Frame rate of an AMC that does not state it when nothing else fits: CMU's, Hz.
-const AMC_FRAME_RATE: f64 = 120.0;
-
 /// A file's content.
 #[derive(Debug, Clone)]
-pub struct NamedBytes {
+pub(crate) struct NamedBytes {
     /// Name given by the user.
     pub name: String,
     /// What it is for.
@@ -33,15 +30,11 @@ impl NamedBytes {
     /// # Errors
     /// If it can't be unpacked, to at most `max_bytes`, or is an archive of several files.
     pub fn unpacked(self, max_bytes: u64) -> Result<Self, InputError> {
-        let lower = self.name.to_ascii_lowercase();
-        if !lower.ends_with(".zst") && !lower.ends_with(".gz") {
-            return Ok(self);
+        let unpacked = archive::unpacked(&self.name, &self.bytes, max_bytes);
+        match unpacked.map_err(|source| InputError::File { file: self.name.clone(), source })? {
+            Some(bytes) => Ok(Self { bytes: bytes.into(), ..self }),
+            None => Ok(self),
         }
-        let limits = archive::Limits { total_bytes: max_bytes, entries: 1, ..archive::Limits::default() };
-        let unpacked = archive::entries(&self.name, &self.bytes, &limits);
-        let mut unpacked = unpacked.map_err(|source| InputError::File { file: self.name.clone(), source })?;
-        let bytes = unpacked.pop().map(|entry| Bytes::from(entry.bytes)).unwrap_or_default();
-        Ok(Self { bytes, ..self })
     }
 }
 
@@ -110,32 +103,18 @@ pub(crate) fn ground_truth(
     seconds: f64,
 ) -> Result<Option<Read<Motion>>, InputError> {
     let Some(file) = at_most_one(files, FileRole::GroundTruth)? else { return Ok(None) };
-    let in_file = |source| InputError::File { file: file.name.clone(), source };
-    let read = match MotionFormat::from_name(&file.name) {
-        Some(MotionFormat::Bvh) => formats::bvh::read(&file.bytes, &reading.bvh).map_err(in_file)?,
-        Some(MotionFormat::Amc) => {
-            let is_asf = |f: &&NamedBytes| SkeletonFormat::from_name(&f.name) == Some(SkeletonFormat::Asf);
-            let acclaim = match at_most_one(files, FileRole::Skeleton)?.filter(is_asf) {
-                Some(skeleton) => read_skeleton(skeleton, reading, &mut Vec::new())?,
-                None => asf::File { skeleton: fallback.clone(), metres_per_unit: asf::CMU_METRES_PER_UNIT },
-            };
-            let read = formats::amc::read(&file.bytes, &acclaim, AMC_FRAME_RATE).map_err(in_file)?;
-            let stated = formats::amc::stated_frame_rate(&file.bytes);
-            let rate = stated.unwrap_or_else(|| amc_frame_rate(read.value.num_frames(), seconds));
-            let motion = Motion::new(acclaim.skeleton, rate, read.value.values().to_vec())
-                .map_err(|e| in_file(e.into()))?;
-            Read { value: motion, warnings: read.warnings }
-        }
-        None => return Err(kind_error(file, "an AMC or BVH file")),
+    let format = MotionFormat::from_name(&file.name).ok_or_else(|| kind_error(file, "an AMC or BVH file"))?;
+    let is_asf = |f: &&NamedBytes| SkeletonFormat::from_name(&f.name) == Some(SkeletonFormat::Asf);
+    let own = match format {
+        MotionFormat::Amc => at_most_one(files, FileRole::Skeleton)?.filter(is_asf),
+        MotionFormat::Bvh => None,
     };
-    Ok(Some(read))
-}
-
-/// The usual rate under which so many frames take nearest to `seconds`, Hz; CMU's 120 where none comes near.
-fn amc_frame_rate(frames: usize, seconds: f64) -> f64 {
-    let off = |rate: &f64| (frames as f64 / rate / seconds.max(1e-9)).ln().abs();
-    let best = [120.0, 60.0, 30.0, 240.0, 100.0].into_iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-    best.filter(|rate| off(rate) < 0.05).unwrap_or(AMC_FRAME_RATE)
+    let acclaim = match own {
+        Some(skeleton) => read_skeleton(skeleton, reading, &mut Vec::new())?,
+        None => asf::File { skeleton: fallback.clone(), metres_per_unit: asf::CMU_METRES_PER_UNIT },
+    };
+    let read = format.read(&file.bytes, &acclaim, seconds, &reading);
+    Ok(Some(read.map_err(|source| InputError::File { file: file.name.clone(), source })?))
 }
 
 fn read_skeleton(
@@ -195,16 +174,4 @@ fn at_most_one(files: &[NamedBytes], role: FileRole) -> Result<Option<&NamedByte
 
 fn kind_error(file: &NamedBytes, expected: &'static str) -> InputError {
     InputError::Kind { file: file.name.clone(), role: file.role, expected }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_rate_of_an_amc_is_that_which_makes_it_as_long_as_the_session() {
-        assert_eq!(amc_frame_rate(1200, 10.0), 120.0);
-        assert_eq!(amc_frame_rate(601, 10.0), 60.0);
-        assert_eq!(amc_frame_rate(5, 10.0), 120.0);
-    }
 }

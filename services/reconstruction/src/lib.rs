@@ -31,8 +31,6 @@ mod run_report;
 
 pub use config::Config;
 pub use error::InputError;
-pub use evaluate::{Truth, truth_of};
-pub use inputs::NamedBytes;
 
 use camera_jobs::Models;
 use priors::Priors;

@@ -8,6 +8,7 @@ mod overlay;
 mod recovery;
 mod run_command;
 mod run_joints;
+mod run_truth;
 mod shape;
 mod sparse_command;
 mod sweep;

@@ -8,16 +8,16 @@ use evaluation::{
     Comparison, ContactThresholds, FootPaths, FootSlide, at_60_hz, compare_in_detail, foot_slide,
     report::{About, run_errors, run_report},
 };
-use formats::{BvhOptions, FileRole, points_csv, session};
+use formats::{BvhOptions, FileRole, archive, points_csv, session, session::MotionFormat};
 use kinematics::{Parametrisation, References};
 use model::Motion;
-use reconstruction::{NamedBytes, Truth, truth_of};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tempfile::TempDir;
 
 use super::{
     run_joints,
+    run_truth::{File, only, true_motion},
     written::{command, write},
 };
 
@@ -94,7 +94,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let session = run.session_id.as_deref().context("the run's session is not there any more")?;
     let files = inputs(args, &downloads, session)?;
-    let Some(name) = files.iter().find(|f| f.role == FileRole::GroundTruth).map(|f| f.name.clone()) else {
+    let Some(truth) = only(&files, FileRole::GroundTruth)? else {
         bail!(
             "run {} has no truth to be compared with: its session has no file of role ground-truth; upload the true motion on \
              the session's skeleton (`marey upload {session} truth.amc`, or a .bvh), or give it: `marey evaluate run {} --truth FILE`",
@@ -102,20 +102,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             run.id
         );
     };
-    let found = downloads.motion(&run.id, is_bvh(&name))?;
+    let name = &truth.name;
+    let found = downloads.motion(&run.id, MotionFormat::from_name(name) == Some(MotionFormat::Bvh))?;
     let mut reading = session::Options::default();
     if let Some(metres) = run.parameters["bvh_metres_per_unit"].as_f64() {
         reading.bvh.metres_per_unit = metres;
     }
-    let truth = match truth_of(&found, &files, found.skeleton(), reading)? {
-        Truth::Known(truth) => truth,
-        Truth::Unknown => bail!("{name} has no motion"),
-        Truth::OtherSkeleton => {
-            bail!(
-                "{name} is on a skeleton of other joints than the result, expected the same: they can't be compared"
-            )
-        }
-    };
+    let truth = true_motion(truth, only(&files, FileRole::Skeleton)?, &found, &reading)?;
+    if !truth.skeleton().same_structure(found.skeleton()) {
+        bail!(
+            "{name} is on a skeleton of other joints than the result, expected the same: they can't be compared"
+        );
+    }
     let rest = References::rest(truth.skeleton());
     let truth = at_60_hz(&Parametrisation::smooth(truth.skeleton(), &rest)?, &truth, usize::MAX)?;
     let comparison = compare_in_detail(&truth, &found);
@@ -132,11 +130,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         );
     }
     if let Some(path) = &args.json {
-        let json = Json { run: &run.id, truth: &name, comparison: &comparison, foot_slide: slide };
+        let json = Json { run: &run.id, truth: name, comparison: &comparison, foot_slide: slide };
         write(path, serde_json::to_vec_pretty(&json)?)?;
     }
     if let Some(path) = &args.html {
-        write(path, run_report(&about(&run, &name), &comparison, slide.as_ref()).into_bytes())?;
+        write(path, run_report(&about(&run, name), &comparison, slide.as_ref()).into_bytes())?;
     }
     Ok(())
 }
@@ -171,28 +169,28 @@ fn joints(args: &Args, downloads: &Downloads<'_>, run: &Run) -> anyhow::Result<(
 }
 
 /// The files that tell the truth: the session's skeleton, and its ground truth or the file given.
-fn inputs(args: &Args, downloads: &Downloads<'_>, session: &str) -> anyhow::Result<Vec<NamedBytes>> {
+fn inputs(args: &Args, downloads: &Downloads<'_>, session: &str) -> anyhow::Result<Vec<File>> {
     let session = format!("/v1/sessions/{}/files", encode(session));
     let listed: Vec<SessionFile> = downloads.client.get(&session)?;
     let mut files = Vec::new();
     for file in listed {
         if file.role == FileRole::Skeleton || (file.role == FileRole::GroundTruth && args.truth.is_none()) {
             let bytes = downloads.get(&format!("{session}/{}", encode(&file.name)), &file.blake3)?;
-            files.push(NamedBytes { name: file.name, role: file.role, bytes: bytes.into() });
+            files.push(File { name: file.name, role: file.role, bytes });
         }
     }
     if let Some(path) = &args.truth {
         let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        files.push(NamedBytes { name, role: FileRole::GroundTruth, bytes: bytes.into() });
+        files.push(File { name, role: FileRole::GroundTruth, bytes });
     }
-    files.into_iter().map(|file| Ok(file.unpacked(MAX_BYTES)?)).collect()
-}
-
-fn is_bvh(name: &str) -> bool {
-    let name = name.to_ascii_lowercase();
-    let name = name.strip_suffix(".zst").or(name.strip_suffix(".gz")).unwrap_or(&name);
-    name.ends_with(".bvh")
+    for file in &mut files {
+        let unpacked = archive::unpacked(&file.name, &file.bytes, MAX_BYTES);
+        if let Some(bytes) = unpacked.with_context(|| file.name.clone())? {
+            file.bytes = bytes;
+        }
+    }
+    Ok(files)
 }
 
 /// Downloads with their checksums checked, kept no longer than needed.

@@ -50,6 +50,19 @@ pub fn entries(name: &str, bytes: &[u8], limits: &Limits) -> Result<Vec<Entry>> 
     entries_where(name, bytes, limits, |_| true)
 }
 
+/// What is in a file whose name says that it is compressed; `None` of one that is as it is.
+///
+/// # Errors
+/// If it can't be unpacked, to at most `max_bytes`, or is an archive of several files.
+pub fn unpacked(name: &str, bytes: &[u8], max_bytes: u64) -> Result<Option<Vec<u8>>> {
+    let lower = name.to_ascii_lowercase();
+    if !lower.ends_with(".zst") && !lower.ends_with(".gz") {
+        return Ok(None);
+    }
+    let limits = Limits { total_bytes: max_bytes, entries: 1, ..Limits::default() };
+    Ok(Some(entries(name, bytes, &limits)?.pop().map(|entry| entry.bytes).unwrap_or_default()))
+}
+
 /// The files of an archive whose names `is_wanted` says yes to, as [`entries`] gives them; it is asked once for each, in
 /// their order, so that it can also list what there is. Others are passed over and take no memory.
 ///

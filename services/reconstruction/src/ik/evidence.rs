@@ -8,9 +8,9 @@ use nalgebra::Vector3;
 
 use super::MAX_POINTS;
 use crate::{
-    InputError, NamedBytes,
+    InputError,
     control::{self, Chosen, Markers},
-    inputs,
+    inputs::{self, NamedBytes},
 };
 
 /// Reads the session's measured points. Without `points` in the request, those of the file that the skeleton has are used.
