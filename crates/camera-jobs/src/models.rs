@@ -60,7 +60,7 @@ impl Models {
     ///
     /// # Errors
     /// If there is none, or it can't be read.
-    pub async fn of_request(&self, which: &str) -> Result<(BodyModelFile, Arc<BodyModel>), ModelError> {
+    pub async fn for_request(&self, which: &str) -> Result<(BodyModelFile, Arc<BodyModel>), ModelError> {
         let file = self.find(which).await?;
         let model = self.get(&file).await.map_err(ModelError::Load)?;
         Ok((file, model))

@@ -1,16 +1,16 @@
 //! Runs that learn body models from scans.
 
+pub use crate::versions::{BodyModelFile, BodyModelName, SHIPPED};
+use crate::{
+    InputFile,
+    run_json::{FileReport, LearnedFrom, Request, Subject, VersionReport},
+};
 use queue::Job;
 use serde::{Deserialize, Serialize};
-use uuid::Uuid;
-
-use crate::InputFile;
+use serde_json::{Value, json};
 
 /// The kind of such runs.
 pub const RUN_KIND: &str = "body-model";
-
-/// Name of the body model that comes with the program; it has no row and no object.
-pub const SHIPPED: &str = "shipped";
 
 /// Learns a body model from uploaded scans. Taken by the shape-init service.
 ///
@@ -33,29 +33,22 @@ impl Job for BuildBodyModel {
     const KIND: &'static str = "build-body-model";
 }
 
-/// A body model by id, name and version.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct BodyModelName {
-    /// The row in `body_models`.
-    pub id: Uuid,
-    /// Name in its project.
-    pub name: String,
-    /// Version of that name, from 1.
-    pub version: i32,
-}
+impl Request for BuildBodyModel {
+    fn run_kind(&self) -> &'static str {
+        RUN_KIND
+    }
 
-/// A body model that is ready.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct BodyModelFile {
-    /// The row in `body_models`; nil for the shipped one.
-    pub id: Uuid,
-    /// Name in its project, or [`SHIPPED`].
-    pub name: String,
-    /// Version of that name, from 1.
-    pub version: i32,
-    /// Where its file is in the object store; `None` for the shipped one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub store_key: Option<String>,
-    /// BLAKE3 of its file, hex.
-    pub blake3: String,
+    fn subject(&self) -> Subject<'_> {
+        let BodyModelName { id, name, version } = &self.body_model;
+        let files = FileReport::all(&self.files);
+        Subject::BodyModel(VersionReport { id: *id, name, version: *version, blake3: None, files })
+    }
+
+    fn learned_from(&self) -> LearnedFrom<'_> {
+        LearnedFrom::default()
+    }
+
+    fn parameters(&self) -> serde_json::Result<Value> {
+        Ok(json!({ "components": self.components, "metres_per_unit": self.metres_per_unit }))
+    }
 }

@@ -5,9 +5,14 @@ use std::collections::BTreeMap;
 use model::Axis;
 use queue::Job;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use uuid::Uuid;
 
-use crate::{InputFile, JobReport, body_model::BodyModelFile};
+use crate::{
+    InputFile, JobReport,
+    body_model::BodyModelFile,
+    run_json::{FileReport, LearnedFrom, Request, SessionReport, Subject},
+};
 
 /// The kind of such runs.
 pub const RUN_KIND: &str = "inverse-kinematics";
@@ -108,6 +113,30 @@ pub struct SolveInverseKinematics {
 
 impl Job for SolveInverseKinematics {
     const KIND: &'static str = "solve-inverse-kinematics";
+}
+
+impl Request for SolveInverseKinematics {
+    fn run_kind(&self) -> &'static str {
+        RUN_KIND
+    }
+
+    fn subject(&self) -> Subject<'_> {
+        Subject::Session(SessionReport {
+            id: self.session_id,
+            name: &self.session_name,
+            files: FileReport::all(&self.files),
+            mapping: Some(&self.how.mapping),
+            ..SessionReport::default()
+        })
+    }
+
+    fn learned_from(&self) -> LearnedFrom<'_> {
+        LearnedFrom { body_model: Some(&self.body_model), ..LearnedFrom::default() }
+    }
+
+    fn parameters(&self) -> serde_json::Result<Value> {
+        serde_json::to_value(&self.how)
+    }
 }
 
 /// What the plan of the cameras hands on.

@@ -12,6 +12,7 @@ pub mod multi_view;
 mod report;
 pub mod run_json;
 pub mod sparse;
+mod versions;
 
 pub use artefacts::{InputFile, Object, file_part, named};
 pub use report::JobReport;

@@ -2,14 +2,17 @@
 
 mod augment;
 
+pub use crate::versions::{MotionDatabaseFile, MotionDatabaseName};
+pub use augment::{Augment, Error};
 use queue::Job;
 use regression::gplvm::TrainingOptions;
 use serde::{Deserialize, Serialize};
-use uuid::Uuid;
+use serde_json::{Value, json};
 
-pub use augment::{Augment, Error};
-
-use crate::{InputFile, Object};
+use crate::{
+    InputFile, JobReport, Object,
+    run_json::{FileReport, LearnedFrom, Request, Subject, VersionReport},
+};
 
 /// The kind of runs that build a motion database.
 pub const RUN_KIND: &str = "motion-database";
@@ -57,6 +60,31 @@ impl Job for PlanMotionDatabase {
     const KIND: &'static str = "plan-motion-database";
 }
 
+impl Request for PlanMotionDatabase {
+    fn run_kind(&self) -> &'static str {
+        RUN_KIND
+    }
+
+    fn subject(&self) -> Subject<'_> {
+        let MotionDatabaseName { id, name, version } = &self.motion_database;
+        let files = FileReport::all(&self.files);
+        Subject::MotionDatabase(VersionReport { id: *id, name, version: *version, blake3: None, files })
+    }
+
+    fn learned_from(&self) -> LearnedFrom<'_> {
+        LearnedFrom { base: self.base.as_ref(), ..LearnedFrom::default() }
+    }
+
+    fn parameters(&self) -> serde_json::Result<Value> {
+        Ok(json!({
+            "without": self.without,
+            "augment": self.augment,
+            "shards": self.shards,
+            "bvh_metres_per_unit": self.bvh_metres_per_unit,
+        }))
+    }
+}
+
 /// Reads the motion files of one part and brings them into the coordinates of the database. Made by the plan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImportMotion {
@@ -79,12 +107,14 @@ impl Job for ImportMotion {
 }
 
 /// What a part holds, beside the part itself: [`ImportMotion`] leaves it.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PartReport {
     /// The clips, in the order of the part.
     pub clips: Vec<PartClip>,
     /// What was sloppy, each with the file's name.
     pub warnings: Vec<String>,
+    /// What it took.
+    pub job: JobReport,
 }
 
 /// A clip of a part.
@@ -105,20 +135,16 @@ pub struct PartClip {
 /// Puts the parts of a database together and writes its index files. Made by the plan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BuildMotionDatabase {
-    /// The database to build.
-    pub motion_database: MotionDatabaseName,
-    /// The database whose clips it begins with.
-    pub base: Option<MotionDatabaseFile>,
-    /// Names of clips of `base` that are left out.
-    pub without: Vec<String>,
-    /// What was made from every clip.
-    pub augment: Augment,
-    /// Into how many index files it is divided.
-    pub shards: usize,
+    /// What the plan was given.
+    pub request: PlanMotionDatabase,
+    /// What the plan itself took.
+    pub plan: JobReport,
 }
 
 impl Job for BuildMotionDatabase {
     const KIND: &'static str = "build-motion-database";
+    // Version 1 had parts of the request, and not the files that `run.json` names.
+    const VERSION: i32 = 2;
 }
 
 /// Trains a latent variable model of poses on a motion database; its completing transaction records it in
@@ -135,31 +161,22 @@ impl Job for TrainGplvm {
     const KIND: &'static str = "train-gplvm";
 }
 
-/// A motion database by id, name and version.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MotionDatabaseName {
-    /// The row in `motion_databases`.
-    pub id: Uuid,
-    /// Name in its project.
-    pub name: String,
-    /// Version of that name, from 1.
-    pub version: i32,
-}
+impl Request for TrainGplvm {
+    fn run_kind(&self) -> &'static str {
+        TRAINING_RUN_KIND
+    }
 
-/// A motion database that is ready.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct MotionDatabaseFile {
-    /// The row in `motion_databases`.
-    pub id: Uuid,
-    /// Name in its project.
-    pub name: String,
-    /// Version of that name, from 1.
-    pub version: i32,
-    /// Where its index file, or the list of them, is in the object store.
-    pub store_key: String,
-    /// BLAKE3 of that, hex.
-    pub blake3: String,
-    /// The GPLVM that was trained on it, for a run that uses one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gplvm: Option<Object>,
+    fn subject(&self) -> Subject<'_> {
+        let MotionDatabaseFile { id, name, version, blake3, .. } = &self.motion_database;
+        let (blake3, files) = (Some(blake3.as_str()), Vec::new());
+        Subject::MotionDatabase(VersionReport { id: *id, name, version: *version, blake3, files })
+    }
+
+    fn learned_from(&self) -> LearnedFrom<'_> {
+        LearnedFrom::default()
+    }
+
+    fn parameters(&self) -> serde_json::Result<Value> {
+        serde_json::to_value(self.parameters)
+    }
 }

@@ -9,15 +9,21 @@ use model::Axis;
 use multi_view::Parameters;
 use queue::Job;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use uuid::Uuid;
 
 pub use silhouettes::{
-    CameraClips, CameraReport, ClipPlace, MakeSilhouettes, Members, Source, SourceKind, StoredClip,
-    clip_name, frame_rate, matches_name, picture_name, report_name,
+    CameraClips, CameraReport, CameraSummary, ClipPlace, MakeSilhouettes, Members, Source, SourceKind,
+    StoredClip, clip_name, frame_rate, matches_name, picture_name, report_name,
 };
 pub use tracking::{DrawOverlay, FitShape, MergeTracks, TRACKED, TrackChunk, TrackingSession};
 
-use crate::{InputFile, body_model::BodyModelFile, inverse_kinematics::InverseKinematics};
+use crate::{
+    InputFile,
+    body_model::BodyModelFile,
+    inverse_kinematics::InverseKinematics,
+    run_json::{FileReport, LearnedFrom, Request, SessionReport, Subject},
+};
 
 /// The kind of such runs.
 pub const RUN_KIND: &str = "multi-view";
@@ -55,4 +61,32 @@ pub struct PlanMultiView {
 
 impl Job for PlanMultiView {
     const KIND: &'static str = "plan-multi-view";
+}
+
+impl Request for PlanMultiView {
+    fn run_kind(&self) -> &'static str {
+        RUN_KIND
+    }
+
+    fn subject(&self) -> Subject<'_> {
+        Subject::Session(SessionReport {
+            id: self.session_id,
+            name: &self.session_name,
+            files: FileReport::all(&self.files),
+            ..SessionReport::default()
+        })
+    }
+
+    fn learned_from(&self) -> LearnedFrom<'_> {
+        LearnedFrom { body_model: Some(&self.body_model), ..LearnedFrom::default() }
+    }
+
+    fn parameters(&self) -> serde_json::Result<Value> {
+        serde_json::to_value(&self.parameters)
+    }
+
+    fn seeds(&self) -> Vec<u64> {
+        // only the search by particles draws any
+        if self.parameters.track { vec![self.parameters.seed] } else { Vec::new() }
+    }
 }

@@ -1,32 +1,101 @@
-//! `run.json`: all that decided a result, what was found, and what it took.
+//! `run.json`: all that decided the results of a run, what was found, and what it took. Runs of all kinds have the same head;
+//! what is a kind's own stands beside it.
 
-use background::CameraQuality;
+mod timings;
+
+use std::collections::{BTreeMap, BTreeSet};
+
 use formats::FileRole;
+use queue::JobError;
 use serde::Serialize;
 use serde_json::Value;
 use uuid::Uuid;
 
+pub use timings::Timings;
+
 use crate::{
-    InputFile, JobReport,
-    body_model::BodyModelFile,
-    multi_view::{CameraReport, PlanMultiView},
+    InputFile,
+    versions::{BodyModelFile, MotionDatabaseFile},
 };
 
-/// The program that made a result.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct Code {
-    /// of the program
-    pub version: &'static str,
-    /// commit that it was built from, when the build said so
-    pub commit: Option<&'static str>,
+/// Name of the result.
+pub const RUN_JSON: &str = "run.json";
+
+/// What a run was asked for: all that decides its results.
+pub trait Request {
+    /// The kind of run.
+    fn run_kind(&self) -> &'static str;
+
+    /// What it is on, with its input files.
+    fn subject(&self) -> Subject<'_>;
+
+    /// What was learned before and is used.
+    fn learned_from(&self) -> LearnedFrom<'_>;
+
+    /// Parameters, all resolved.
+    ///
+    /// # Errors
+    /// If they are no JSON.
+    fn parameters(&self) -> serde_json::Result<Value>;
+
+    /// What random numbers came from; empty where nothing is drawn at random.
+    fn seeds(&self) -> Vec<u64> {
+        Vec::new()
+    }
 }
 
-impl Code {
-    /// This program.
-    pub const THIS: Self = Self { version: env!("CARGO_PKG_VERSION"), commit: option_env!("MAREY_COMMIT") };
+/// What a run is on: what it reads, or what it makes.
+#[derive(Debug, Clone, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Subject<'a> {
+    /// a capture session that it reads
+    Session(SessionReport<'a>),
+    /// a motion database that it builds, or trains a model on
+    MotionDatabase(VersionReport<'a>),
+    /// a body model that it learns
+    BodyModel(VersionReport<'a>),
 }
 
-/// A file of a session.
+/// A capture session.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct SessionReport<'a> {
+    /// its id
+    pub id: Uuid,
+    /// its name
+    pub name: &'a str,
+    /// its files
+    pub files: Vec<FileReport<'a>>,
+    /// name in the file → name of a control point or joint
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mapping: Option<&'a BTreeMap<String, String>>,
+    /// frames that were solved
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frames: Option<usize>,
+    /// of these
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_rate_hz: Option<f64>,
+    /// measured points that were used, by name
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points: Option<Vec<&'a str>>,
+}
+
+/// One version of a database or model.
+#[derive(Debug, Clone, Serialize)]
+pub struct VersionReport<'a> {
+    /// its id
+    pub id: Uuid,
+    /// its name
+    pub name: &'a str,
+    /// version of that name, from 1
+    pub version: i32,
+    /// of its file, where it was built before
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blake3: Option<&'a str>,
+    /// the files that it is built from
+    pub files: Vec<FileReport<'a>>,
+}
+
+/// An uploaded file.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct FileReport<'a> {
     name: &'a str,
@@ -35,116 +104,105 @@ pub struct FileReport<'a> {
     blake3: &'a str,
 }
 
-impl<'a> From<&'a InputFile> for FileReport<'a> {
-    fn from(file: &'a InputFile) -> Self {
-        Self { name: &file.name, role: file.role, bytes: file.bytes, blake3: &file.blake3 }
+impl<'a> FileReport<'a> {
+    /// Of all of these files.
+    pub fn all(files: &'a [InputFile]) -> Vec<Self> {
+        let report = |file: &'a InputFile| Self {
+            name: &file.name,
+            role: file.role,
+            bytes: file.bytes,
+            blake3: &file.blake3,
+        };
+        files.iter().map(report).collect()
     }
 }
 
-/// What a run was on.
-#[derive(Debug, Clone, Serialize)]
-pub struct SessionReport<'a> {
-    id: Uuid,
-    name: &'a str,
-    files: Vec<FileReport<'a>>,
-}
-
-#[derive(Debug, Clone, Serialize)]
-struct OfCamera<'a> {
-    name: &'a str,
-    source: &'a str,
-    plate: Option<&'a str>,
-    size: [u32; 2],
-    end_frame: usize,
-    frame_rate_hz: Option<f64>,
-    quality: Option<&'a CameraQuality>,
-    warnings: &'a [String],
-}
-
-#[derive(Debug, Clone, Serialize)]
-struct Timings<'a> {
-    plan: &'a JobReport,
-    cameras: Vec<&'a JobReport>,
-    initialise: &'a JobReport,
-    #[serde(skip_serializing_if = "<[JobReport]>::is_empty")]
-    chunks: &'a [JobReport],
+/// Versions of what was learned before and is used.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct LearnedFrom<'a> {
+    /// the motion database that serves as prior
     #[serde(skip_serializing_if = "Option::is_none")]
-    merge: Option<&'a JobReport>,
+    pub motion_database: Option<&'a MotionDatabaseFile>,
+    /// the bodies that people may have
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body_model: Option<&'a BodyModelFile>,
+    /// the motion database whose clips another begins with
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub base: Option<&'a MotionDatabaseFile>,
 }
 
-/// What a run that follows the person adds to its report.
-#[derive(Debug, Clone, Serialize)]
-pub struct TrackingParts<'a> {
-    /// what was found
-    pub found: Value,
-    /// who tracked the chunks
-    pub chunks: &'a [JobReport],
-    /// who put them together
-    pub merge: &'a JobReport,
+/// The program that made a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Code {
+    /// of the program
+    pub version: &'static str,
+    /// commit that it was built from, when the build knew it
+    pub commit: Option<&'static str>,
 }
 
-/// The report of a run on cameras.
-#[derive(Debug, Clone, Serialize)]
-pub struct MultiViewReport<'a> {
+impl Code {
+    /// This program.
+    pub const THIS: Self =
+        Self { version: env!("CARGO_PKG_VERSION"), commit: option_env!("MAREY_BUILT_COMMIT") };
+}
+
+/// A run whose results are made.
+#[derive(Debug, Clone)]
+pub struct RunReport<'a> {
+    /// the run
+    pub run_id: Uuid,
+    /// what was doubtful
+    pub warnings: &'a [String],
+    /// who did what, and how long it took
+    pub timings: Timings<'a>,
+    /// frames of a session that were solved, and how many there are a second
+    pub frames: Option<(usize, f64)>,
+    /// measured points of a session that were used, by name
+    pub points: Option<Vec<&'a str>>,
+}
+
+#[derive(Serialize)]
+struct Document<'a, Own> {
     run_id: Uuid,
     kind: &'static str,
     code: Code,
-    session: SessionReport<'a>,
-    body_model: &'a BodyModelFile,
-    parameters: &'a multi_view::Parameters,
-    /// What random numbers came from: only the search by particles draws any.
+    #[serde(flatten)]
+    subject: Subject<'a>,
+    #[serde(flatten)]
+    learned_from: LearnedFrom<'a>,
+    parameters: Value,
     seeds: Vec<u64>,
-    cameras: Vec<OfCamera<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    tracking: Option<Value>,
+    #[serde(flatten)]
+    own: Own,
     warnings: &'a [String],
-    timings: Timings<'a>,
+    workers: BTreeSet<&'a str>,
+    timings: &'a Timings<'a>,
 }
 
-impl<'a> MultiViewReport<'a> {
-    /// Of a run that has found a body, and with `tracking` has followed it.
-    pub fn new(
-        run_id: Uuid,
-        request: &'a PlanMultiView,
-        (plan, initialise): (&'a JobReport, &'a JobReport),
-        cameras: &'a [CameraReport],
-        warnings: &'a [String],
-        tracking: Option<TrackingParts<'a>>,
-    ) -> Self {
-        let camera = |c: &'a CameraReport| OfCamera {
-            name: &c.camera.name,
-            source: &c.source.name,
-            plate: c.plate.as_deref(),
-            size: c.camera.size,
-            end_frame: c.end_frame,
-            frame_rate_hz: c.frame_rate,
-            quality: c.quality.as_ref(),
-            warnings: &c.warnings,
-        };
-        let (chunks, merge) =
-            tracking.as_ref().map_or((&[][..], None), |parts| (parts.chunks, Some(parts.merge)));
-        Self {
-            run_id,
-            kind: "multi-view",
-            code: Code::THIS,
-            session: SessionReport {
-                id: request.session_id,
-                name: &request.session_name,
-                files: request.files.iter().map(FileReport::from).collect(),
-            },
-            body_model: &request.body_model,
-            parameters: &request.parameters,
-            seeds: if tracking.is_some() { vec![request.parameters.seed] } else { Vec::new() },
-            cameras: cameras.iter().map(camera).collect(),
-            tracking: tracking.map(|parts| parts.found),
-            warnings,
-            timings: Timings {
-                plan,
-                cameras: cameras.iter().map(|c| &c.job).collect(),
-                initialise,
-                chunks,
-                merge,
-            },
+impl RunReport<'_> {
+    /// The content of [`RUN_JSON`]; `own`: the parts that runs of this kind have beside the head, an object.
+    ///
+    /// # Errors
+    /// To be tried again if it is no JSON.
+    pub fn to_json(&self, request: &impl Request, own: impl Serialize) -> Result<Vec<u8>, JobError> {
+        let mut subject = request.subject();
+        if let Subject::Session(session) = &mut subject {
+            (session.frames, session.frame_rate_hz) = self.frames.unzip();
+            session.points = self.points.clone();
         }
+        let document = Document {
+            run_id: self.run_id,
+            kind: request.run_kind(),
+            code: Code::THIS,
+            subject,
+            learned_from: request.learned_from(),
+            parameters: request.parameters().map_err(JobError::retry)?,
+            seeds: request.seeds(),
+            own,
+            warnings: self.warnings,
+            workers: self.timings.workers(),
+            timings: &self.timings,
+        };
+        serde_json::to_vec_pretty(&document).map_err(JobError::retry)
     }
 }

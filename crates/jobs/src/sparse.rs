@@ -6,11 +6,16 @@ use formats::{BvhOptions, PointsOptions, session};
 use model::Axis;
 use queue::Job;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use skeleton_fit::{LimbScale, Sizes};
 use sparse::Parameters;
 use uuid::Uuid;
 
-use crate::{InputFile, JobReport, Object, motion_database::MotionDatabaseFile};
+use crate::{
+    InputFile, JobReport, Object,
+    motion_database::MotionDatabaseFile,
+    run_json::{FileReport, LearnedFrom, Request, SessionReport, Subject},
+};
 
 /// The kind of such runs.
 pub const RUN_KIND: &str = "reconstruction";
@@ -68,6 +73,30 @@ impl PlanSparse {
             points: PointsOptions { up: self.up, sigma_m: self.parameters.control_sigma_m },
             bvh: BvhOptions { metres_per_unit: self.bvh_metres_per_unit },
         }
+    }
+}
+
+impl Request for PlanSparse {
+    fn run_kind(&self) -> &'static str {
+        RUN_KIND
+    }
+
+    fn subject(&self) -> Subject<'_> {
+        Subject::Session(SessionReport {
+            id: self.session_id,
+            name: &self.session_name,
+            files: FileReport::all(&self.files),
+            mapping: Some(&self.mapping),
+            ..SessionReport::default()
+        })
+    }
+
+    fn learned_from(&self) -> LearnedFrom<'_> {
+        LearnedFrom { motion_database: Some(&self.motion_database), ..LearnedFrom::default() }
+    }
+
+    fn parameters(&self) -> serde_json::Result<Value> {
+        serde_json::to_value(&self.parameters)
     }
 }
 

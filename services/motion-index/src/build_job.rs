@@ -6,14 +6,19 @@ use crate::{
     shards,
     sources::Sources,
 };
-use jobs::motion_database::BuildMotionDatabase;
+use jobs::{
+    motion_database::{BuildMotionDatabase, PlanMotionDatabase},
+    run_json::{RUN_JSON, RunReport, Timings},
+};
 use library::{
     AllCores,
     motion_database::{INDEX, SHARDS, Shard, ShardList, ShardedClip},
 };
 use motion_db::MotionDatabase;
 use queue::{Handler, JobContext, JobError, Outcome};
+use results::{ResultFile, media_type::JSON};
 use serde::Serialize;
+use serde_json::json;
 use service::{Resources, compute, objects};
 use sqlx::{PgConnection, types::Json};
 use std::io::{BufWriter, Seek};
@@ -35,35 +40,59 @@ pub(crate) struct BuildHandler {
 impl Handler for BuildHandler {
     type Job = BuildMotionDatabase;
 
-    async fn run(&self, context: JobContext, payload: BuildMotionDatabase) -> Result<Outcome, JobError> {
-        let id = payload.motion_database.id;
+    async fn run(&self, context: JobContext, job: BuildMotionDatabase) -> Result<Outcome, JobError> {
+        let BuildMotionDatabase { request, plan } = job;
+        let (store, id) = (&self.resources.store, request.motion_database.id);
         let own = key::motion_database_job_prefix(id, context.id().0);
-        objects::clean_up_earlier_attempts_under(&self.resources.store, &context, &own).await;
+        objects::clean_up_earlier_attempts_under(store, &context, &own).await;
         context.progress(0.0, "listing clips");
-        let sources = Sources::find(&context, &self.resources, &payload).await?;
-        let written = self.write(&context, &payload, &sources).await?;
+        let sources = Sources::find(&context, &self.resources, &request).await?;
+        let written = self.write(&context, &request, &sources).await?;
         context.check()?;
-        let clips: Vec<Clip> = sources.clips.into_iter().map(|listed| listed.clip).collect();
+        let Sources { clips, warnings, imports, .. } = sources;
+        let clips: Vec<Clip> = clips.into_iter().map(|listed| listed.clip).collect();
         let contents = Contents {
             frame_rate_hz: motion_db::FRAME_RATE,
             num_joints: written.num_joints,
             num_dofs: written.num_dofs,
             actions: shares(&clips, |clip| &clip.action),
             subjects: shares(&clips, |clip| &clip.subject),
-            augment: payload.augment,
-            warnings: shortened(sources.warnings),
+            augment: request.augment.clone(),
+            warnings: shortened(warnings),
         };
         let num_poses = clips.iter().map(|clip| clip.num_poses).sum();
         let ready = Ready { id, written, num_poses, contents, clips };
-        let summary = serde_json::to_vec_pretty(&Summary::from(&ready)).map_err(JobError::retry)?;
-        let summary =
-            objects::write_result(&self.resources.store, &context, SUMMARY, "application/json", summary)
-                .await?;
-        Ok(Outcome::default().artefact(summary).on_complete(move |connection| {
+        let build = self.resources.job_report(&context, num_poses);
+        let timings = Timings::default().one("plan", &plan).all("imports", &imports).one("build", &build);
+        let files = vec![
+            ResultFile::json(SUMMARY, &Summary::from(&ready))?,
+            run_json(context.run_id().0, &request, &ready, timings)?,
+        ];
+        let files = results::write(store, &context, files, 0.98..1.0).await?;
+        Ok(Outcome::default().artefacts(files).on_complete(move |connection| {
             let ready = ready.clone();
             Box::pin(async move { set_ready(connection, &ready).await })
         }))
     }
+}
+
+/// `run.json`.
+fn run_json(
+    run_id: Uuid,
+    request: &PlanMotionDatabase,
+    ready: &Ready,
+    timings: Timings<'_>,
+) -> Result<ResultFile, JobError> {
+    let warnings = &ready.contents.warnings;
+    let report = RunReport { run_id, warnings, timings, frames: None, points: None };
+    let built = json!({
+        "num_poses": ready.num_poses,
+        "num_clips": ready.clips.len(),
+        "num_shards": ready.written.num_shards,
+        "bytes": ready.written.bytes,
+        "blake3": ready.written.stored.blake3,
+    });
+    Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(request, json!({ "built": built }))?))
 }
 
 /// The index files of a database, or the one.
@@ -84,7 +113,7 @@ impl BuildHandler {
     async fn write(
         &self,
         context: &JobContext,
-        payload: &BuildMotionDatabase,
+        request: &PlanMotionDatabase,
         sources: &Sources,
     ) -> Result<Written, JobError> {
         if sources.clips.is_empty() {
@@ -93,12 +122,12 @@ impl BuildHandler {
             return Err(JobError::give_up(message, ""));
         }
         let sizes: Vec<usize> = sources.clips.iter().map(|listed| listed.clip.num_poses).collect();
-        let shard_of = shards::assign(&sizes, payload.shards);
+        let shard_of = shards::assign(&sizes, request.shards);
         let num_shards = shard_of.iter().max().map_or(1, |last| last + 1);
         let mut stored = Vec::with_capacity(num_shards);
         let mut last = None;
         for shard in 0..num_shards {
-            let mut database = self.gather(context, payload, sources, &shard_of, (shard, num_shards)).await?;
+            let mut database = self.gather(context, request, sources, &shard_of, (shard, num_shards)).await?;
             if num_shards == 1 {
                 // Shards keep what was recorded: zero poses are learned of all performers at once, when they are put together.
                 database = compute::run(move || {
@@ -110,7 +139,7 @@ impl BuildHandler {
             let (skeleton, num_dofs) = (database.skeleton().clone(), database.num_dofs());
             context.progress((shard as f64 + 0.9) / num_shards as f64, "writing the index");
             let name = if num_shards == 1 { INDEX.to_owned() } else { format!("{shard:03}.mdb") };
-            stored.push(self.put_index(context, payload, &name, database).await?);
+            stored.push(self.put_index(context, request, &name, database).await?);
             last = Some((skeleton, num_dofs));
         }
         let Some((skeleton, num_dofs)) = last else { return Err(JobError::retry("no shard was written")) };
@@ -120,7 +149,7 @@ impl BuildHandler {
             Err(several) => {
                 let list =
                     serde_json::to_vec(&list(sources, &shard_of, &several)).map_err(JobError::retry)?;
-                self.put(context, payload, SHARDS, list).await?
+                self.put(context, request, SHARDS, list).await?
             }
         };
         let (skeleton, num_joints) = (skeleton.name().to_owned(), skeleton.num_joints());
@@ -131,7 +160,7 @@ impl BuildHandler {
     async fn gather(
         &self,
         context: &JobContext,
-        payload: &BuildMotionDatabase,
+        request: &PlanMotionDatabase,
         sources: &Sources,
         shard_of: &[usize],
         (shard, num_shards): (usize, usize),
@@ -145,11 +174,11 @@ impl BuildHandler {
             let source = listed[0].source;
             let done = (shard as f64 + 0.8 * source as f64 / sources.files.len() as f64) / num_shards as f64;
             context.progress(done, format!("putting {} clips together", sources.clips.len()));
-            let part = sources.open(source, &self.resources, payload).await?;
+            let part = sources.open(source, &self.resources, request).await?;
             let mut database = match gathered.take() {
                 Some(database) => database,
                 None => {
-                    self.check_memory(num_poses, part.num_dofs(), payload)?;
+                    self.check_memory(num_poses, part.num_dofs(), request)?;
                     part.emptied()
                 }
             };
@@ -171,7 +200,7 @@ impl BuildHandler {
         &self,
         num_poses: usize,
         num_dofs: usize,
-        payload: &BuildMotionDatabase,
+        request: &PlanMotionDatabase,
     ) -> Result<(), JobError> {
         let needed = (num_poses * (2 * num_dofs * size_of::<f32>() + WRITING_BYTES)) as u64;
         let limit = self.resources.memory.max_build_bytes;
@@ -181,8 +210,8 @@ impl BuildHandler {
         let message = format!(
             "an index file of {num_poses} poses takes {needed} bytes of memory while it is built, expected at most \
              {limit}; build {} shards or more (now {})",
-            payload.shards as u64 * needed.div_ceil(limit.max(1)) + 1,
-            payload.shards
+            request.shards as u64 * needed.div_ceil(limit.max(1)) + 1,
+            request.shards
         );
         Err(JobError::give_up(message, "or raise MAREY_MAX_BUILD_BYTES"))
     }
@@ -191,7 +220,7 @@ impl BuildHandler {
     async fn put_index(
         &self,
         context: &JobContext,
-        payload: &BuildMotionDatabase,
+        request: &PlanMotionDatabase,
         name: &str,
         database: MotionDatabase,
     ) -> Result<Stored, JobError> {
@@ -206,23 +235,23 @@ impl BuildHandler {
         });
         let file = ReaderStream::with_capacity(tokio::fs::File::from_std(file.await?), READ_BYTES);
         let limits = UploadLimits { max_bytes: u64::MAX, expected_blake3: None };
-        let key = self.key(context, payload, name)?;
+        let key = self.key(context, request, name)?;
         self.resources.store.put_stream(&key, file, &limits).await.map_err(JobError::retry)
     }
 
-    fn key(&self, context: &JobContext, payload: &BuildMotionDatabase, name: &str) -> Result<Key, JobError> {
-        let id = payload.motion_database.id;
+    fn key(&self, context: &JobContext, request: &PlanMotionDatabase, name: &str) -> Result<Key, JobError> {
+        let id = request.motion_database.id;
         key::motion_database(id, context.id().0, context.lease_number().0, name).map_err(JobError::retry)
     }
 
     async fn put(
         &self,
         context: &JobContext,
-        payload: &BuildMotionDatabase,
+        request: &PlanMotionDatabase,
         name: &str,
         bytes: Vec<u8>,
     ) -> Result<Stored, JobError> {
-        let key = self.key(context, payload, name)?;
+        let key = self.key(context, request, name)?;
         self.resources.store.put(&key, bytes.into()).await.map_err(JobError::retry)
     }
 }

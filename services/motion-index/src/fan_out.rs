@@ -70,7 +70,7 @@ impl FanOut {
         database: Uuid,
         shard: usize,
     ) -> Result<Vec<Match>, Error> {
-        if let Some(asked) = self.peers.of_shard(database, shard) {
+        if let Some(asked) = self.peers.for_shard(database, shard) {
             match question.ask_peer(asked.client.clone(), shard).await {
                 Ok(found) => return Ok(found),
                 Err(status) if asked.is_down(&status) => {}

@@ -37,9 +37,11 @@ impl Handler for ImportHandler {
         let skeletons = self.read("the skeletons", &payload.skeletons).await?;
         let motions = self.read("the motions", &payload.motions).await?;
         let watched = context.clone();
-        let (part, report) =
+        let Imported { part, clips, warnings } =
             compute::run(move || import(&basis, &skeletons, &motions, &payload, &watched)).await?;
         context.check()?;
+        let num_poses = clips.iter().map(|clip| clip.num_poses).sum();
+        let report = PartReport { clips, warnings, job: self.resources.job_report(&context, num_poses) };
         let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
         let report =
             objects::write(&self.resources.store, &context, REPORT, "application/json", report).await?;
@@ -54,33 +56,41 @@ impl Handler for ImportHandler {
     }
 }
 
+/// What came of the motion files of one part.
+struct Imported {
+    /// none if all clips were too short
+    part: Option<Vec<u8>>,
+    clips: Vec<PartClip>,
+    warnings: Vec<String>,
+}
+
 fn import(
     basis: &[u8],
     skeletons: &[u8],
     motions: &[u8],
     payload: &ImportMotion,
     context: &JobContext,
-) -> Result<(Option<Vec<u8>>, PartReport), JobError> {
+) -> Result<Imported, JobError> {
     let basis = MotionDatabase::from_bytes(basis).map_err(JobError::retry)?;
     let motions = inputs::unpack_packed(motions)?;
     let mut reader = Reader::new(inputs::unpack_packed(skeletons)?, payload.bvh_metres_per_unit);
     let augment = Augment { mirror: payload.augment.mirror, speeds: payload.augment.warps.clone() };
     let mut part = basis.emptied();
-    let mut report = PartReport::default();
+    let (mut clips, mut warnings) = (Vec::new(), Vec::new());
     let num_files = motions.len();
     for (file, motion) in motions.into_iter().enumerate() {
         context.check()?;
         context.progress(file as f64 / num_files as f64, format!("reading {}", motion.name));
-        let (clip, warnings) = reader.clip(motion)?;
-        report.warnings.extend(warnings);
+        let (clip, sloppy) = reader.clip(motion)?;
+        warnings.extend(sloppy);
         let Some(clip) = clip else { continue };
         for clip in augment.clips(&clip).map_err(|e| no_database(&e))? {
             let num_poses = part.append(&clip).map_err(|e| no_database(&e))?;
             if num_poses > 0 {
                 let (name, subject, action) = (clip.name, clip.subject, clip.action);
-                report.clips.push(PartClip { file, name, subject, action, num_poses });
+                clips.push(PartClip { file, name, subject, action, num_poses });
             }
         }
     }
-    Ok(((!report.clips.is_empty()).then(|| part.to_bytes()), report))
+    Ok(Imported { part: (!clips.is_empty()).then(|| part.to_bytes()), clips, warnings })
 }

@@ -58,7 +58,7 @@ impl Peers {
     }
 
     /// The replica that answers for a shard, unless it is this one, or down.
-    pub fn of_shard(&self, database: Uuid, shard: usize) -> Option<AskedPeer<'_>> {
+    pub fn for_shard(&self, database: Uuid, shard: usize) -> Option<AskedPeer<'_>> {
         let owner =
             self.all.iter().max_by_key(|peer| (weight(&peer.address, database, shard), &peer.address))?;
         let is_down = lock(&owner.down_since).is_some_and(|since| since.elapsed() < REST);

@@ -60,13 +60,8 @@ impl Handler for PlanHandler {
             }
             outcome = outcome.artefact(basis).artefact(skeletons);
         }
-        let build = BuildMotionDatabase {
-            motion_database: request.motion_database,
-            base: request.base,
-            without: request.without,
-            augment: request.augment,
-            shards: request.shards,
-        };
+        let plan = self.resources.job_report(&context, 0);
+        let build = BuildMotionDatabase { request, plan };
         let num_imports = imports.len();
         imports.push(ChildJob::new(&build)?.depends_on(0..num_imports));
         Ok(divided.parts.into_iter().fold(outcome, Outcome::artefact).children(imports))

@@ -5,7 +5,10 @@ use crate::{
     import_job::{PART, REPORT},
     plan_job::full_name,
 };
-use jobs::motion_database::{BuildMotionDatabase, PartReport};
+use jobs::{
+    JobReport,
+    motion_database::{PartReport, PlanMotionDatabase},
+};
 use library::{motion_database, motion_database::Shard};
 use motion_db::{MotionDatabase, trial_name};
 use queue::{Artefact, JobContext, JobError};
@@ -34,6 +37,8 @@ pub(crate) struct Sources {
     pub files: Vec<Source>,
     pub clips: Vec<Listed>,
     pub warnings: Vec<String>,
+    /// what the imports took
+    pub imports: Vec<JobReport>,
     names: Names,
 }
 
@@ -45,10 +50,10 @@ impl Sources {
     pub async fn find(
         context: &JobContext,
         resources: &Resources,
-        payload: &BuildMotionDatabase,
+        request: &PlanMotionDatabase,
     ) -> Result<Self, JobError> {
         let mut sources = Self::default();
-        sources.add_base(resources, payload).await?;
+        sources.add_base(resources, request).await?;
         let mut connection = resources.pool.acquire().await?;
         let artefacts = queue::dependency_artefacts(&mut connection, context.id()).await?;
         drop(connection);
@@ -66,18 +71,18 @@ impl Sources {
     async fn add_base(
         &mut self,
         resources: &Resources,
-        payload: &BuildMotionDatabase,
+        request: &PlanMotionDatabase,
     ) -> Result<(), JobError> {
         use motion_database::Index;
         let (store, max_bytes) = (&resources.store, resources.memory.max_build_bytes);
-        let Some(base) = &payload.base else { return Ok(()) };
+        let Some(base) = &request.base else { return Ok(()) };
         let failed = |error: motion_database::Error| error.into_job_error(&full_name(base));
         let shards = match motion_database::read(store, &base.store_key, &base.blake3, max_bytes).await {
             Err(error) => return Err(failed(error)),
             Ok(Index::Whole(file)) => vec![file],
             Ok(Index::Sharded(list)) => list.shards,
         };
-        let without: BTreeSet<&str> = payload.without.iter().map(String::as_str).collect();
+        let without: BTreeSet<&str> = request.without.iter().map(String::as_str).collect();
         for shard in shards {
             let database = shard.open(store, max_bytes).await.map_err(failed)?.database;
             for (index, clip) in database.clips().iter().enumerate() {
@@ -98,6 +103,7 @@ impl Sources {
 
     fn add_part(&mut self, report: PartReport, part: Option<&Artefact>) {
         self.warnings.extend(report.warnings);
+        self.imports.push(report.job);
         let Some(part) = part else { return };
         let names = names(&report.clips, &mut self.names);
         for (index, (clip, name)) in report.clips.into_iter().zip(names).enumerate() {
@@ -118,9 +124,9 @@ impl Sources {
         &self,
         source: usize,
         resources: &Resources,
-        payload: &BuildMotionDatabase,
+        request: &PlanMotionDatabase,
     ) -> Result<Arc<MotionDatabase>, JobError> {
-        match (&self.files[source], &payload.base) {
+        match (&self.files[source], &request.base) {
             (Source::Base(shard), Some(base)) => {
                 let opened = shard.open(&resources.store, resources.memory.max_build_bytes).await;
                 Ok(opened.map_err(|error| error.into_job_error(&full_name(base)))?.database)

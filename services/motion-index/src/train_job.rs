@@ -1,9 +1,14 @@
 //! The job that trains a latent variable model of poses on a motion database.
 
 use crate::plan_job::full_name;
-use jobs::motion_database::TrainGplvm;
+use jobs::{
+    motion_database::TrainGplvm,
+    run_json::{RUN_JSON, RunReport, Timings},
+};
 use library::motion_database;
 use queue::{Handler, JobContext, JobError, Outcome};
+use results::{ResultFile, media_type::JSON};
+use serde_json::json;
 use service::{Resources, compute, objects};
 use sqlx::{PgConnection, types::Json};
 use std::ops::ControlFlow;
@@ -46,7 +51,14 @@ impl Handler for TrainHandler {
             .map_err(JobError::retry)?;
         let stored = store.put(&key, model.into()).await.map_err(JobError::retry)?;
         let run = context.run_id().0;
-        Ok(Outcome::default().on_complete(move |connection| {
+        let report = self.resources.job_report(&context, 0);
+        let timings = Timings::default().one("train", &report);
+        let report = RunReport { run_id: run, warnings: &[], timings, frames: None, points: None };
+        let built = json!({ "bytes": stored.bytes, "blake3": stored.blake3 });
+        let report = report.to_json(&request, json!({ "built": built }))?;
+        let report = ResultFile::ready(RUN_JSON, JSON, report);
+        let report = results::write_one(store, &context, report).await?;
+        Ok(Outcome::default().artefact(report).on_complete(move |connection| {
             let (request, stored) = (request.clone(), stored.clone());
             Box::pin(async move { record(connection, run, &request, &stored).await })
         }))

@@ -1,69 +1,28 @@
-//! The files that people get.
+//! The files that people get of a run from control points.
 
 use crate::feet::Finished;
-use kinematics::{Kinematics, Parametrisation};
 use model::{ChannelKind, Motion};
-use std::fmt::Write as _;
+use queue::JobError;
+use results::{Kind, ResultFile, cell, formats, media_type::CSV};
+use std::{fmt::Write as _, sync::Arc};
 
-/// A result's name, its media type, and how it is written.
-pub(crate) struct Export {
-    /// Name of the file.
-    pub name: &'static str,
-    /// Its media type.
-    pub media_type: &'static str,
-    /// Makes the content.
-    pub write: fn(&Finished) -> String,
+impl results::Finished for Finished {
+    const KIND: Kind = Kind::Sparse;
+
+    fn motion(&self) -> &Motion {
+        &self.merged.motion
+    }
 }
 
-const TEXT: &str = "text/plain; charset=utf-8";
-const CSV: &str = "text/csv; charset=utf-8";
-
-/// All of them, made one after the other so that only one is in memory at a time.
-pub(crate) const EXPORTS: [Export; 7] = [
-    Export { name: "motion.bvh", media_type: TEXT, write: |m| formats::bvh::write(&m.merged.motion) },
-    Export { name: "motion.amc", media_type: TEXT, write: |m| formats::amc::write(&m.merged.motion) },
-    Export {
-        name: "skeleton.asf",
-        media_type: TEXT,
-        write: |m| formats::asf::write(m.merged.motion.skeleton()),
-    },
-    Export { name: "poses.csv", media_type: CSV, write: |m| formats::motion_csv::write(&m.merged.motion) },
-    Export { name: "positions.csv", media_type: CSV, write: |m| positions(&m.merged.motion) },
-    Export { name: "quality.csv", media_type: CSV, write: quality },
-    Export { name: "sigma.csv", media_type: CSV, write: sigmas },
-];
-
-/// Positions of all joints: `frame,time,root_x,root_y,root_z,…`; seconds and metres, y up.
-pub(crate) fn positions(motion: &Motion) -> String {
-    let skeleton = motion.skeleton();
-    let mut out = String::from("frame,time");
-    for joint in skeleton.joints() {
-        let name = quoted(&joint.name);
-        let _ = write!(out, ",{}", name.replace('\u{0}', "_x"));
-        let _ = write!(out, ",{}", name.replace('\u{0}', "_y"));
-        let _ = write!(out, ",{}", name.replace('\u{0}', "_z"));
-    }
-    out.push('\n');
-    let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
-    let mut state = kinematics.state();
-    for (frame, pose) in motion.poses().enumerate() {
-        kinematics.update(pose, &mut state);
-        let _ = write!(out, "{frame},{:.6}", frame as f64 / motion.frame_rate());
-        for p in &state.positions {
-            let _ = write!(out, ",{:.7},{:.7},{:.7}", p.x, p.y, p.z);
-        }
-        out.push('\n');
-    }
-    out
-}
-
-/// A joint's name as a cell with a place (NUL) for the suffix; quoted if it must be.
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\u{0}\"", name.replace('"', "\"\""))
-    } else {
-        format!("{name}\u{0}")
-    }
+/// The motion in every format, and how well it is known.
+pub(crate) fn files(finished: &Arc<Finished>) -> Vec<ResultFile> {
+    let table = |name: &str, write: fn(&Finished) -> String| {
+        let finished = finished.clone();
+        ResultFile::new(name, CSV, move || Ok::<_, JobError>(write(&finished).into_bytes()))
+    };
+    let mut files = formats(finished);
+    files.extend([table("quality.csv", quality), table("sigma.csv", sigmas)]);
+    files
 }
 
 /// How well each frame is known, and what its feet do (empty where feet were not looked for).
@@ -108,7 +67,7 @@ fn sigmas(finished: &Finished) -> String {
         .collect();
     let mut out = String::from("frame,time");
     for name in motion.skeleton().dof_names() {
-        let _ = write!(out, ",{}", quoted(&name).replace('\u{0}', ""));
+        let _ = write!(out, ",{}", cell(&name, ""));
     }
     out.push('\n');
     for (frame, row) in finished.merged.sigmas.chunks_exact(dofs.max(1)).enumerate() {
@@ -131,23 +90,6 @@ mod tests {
         let root = Joint::root(name, vec![Channel::translation(Axis::X), Channel::rotation(Axis::X)]);
         let skeleton = Skeleton::new("s", vec![root]).unwrap();
         Motion::new(skeleton.into(), 60.0, vec![0.5, 0.0, 1.0, 0.0]).unwrap()
-    }
-
-    #[test]
-    fn positions_have_a_row_a_frame() {
-        let text = positions(&motion("root"));
-        assert_eq!(
-            text,
-            "frame,time,root_x,root_y,root_z\n\
-             0,0.000000,0.5000000,0.0000000,0.0000000\n\
-             1,0.016667,1.0000000,0.0000000,0.0000000\n"
-        );
-    }
-
-    #[test]
-    fn a_joint_with_a_comma_in_its_name_stays_one_column() {
-        let text = positions(&motion("a,b"));
-        assert!(text.starts_with("frame,time,\"a,b_x\",\"a,b_y\",\"a,b_z\"\n"), "{text}");
     }
 
     #[test]

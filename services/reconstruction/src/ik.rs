@@ -4,6 +4,8 @@ pub(crate) mod call;
 pub(crate) mod job;
 
 mod evidence;
+mod export;
+mod finished;
 mod report;
 
 use inverse_kinematics::Method;

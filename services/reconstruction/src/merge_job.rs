@@ -3,15 +3,14 @@
 use crate::{
     Shared, chunk_job,
     error::InputError,
-    evaluate,
-    export::EXPORTS,
+    evaluate, export,
     feet::{self, Finished},
-    plan_job,
-    run_report::{RUN, RunReport},
+    plan_job, run_report,
 };
 use formats::FileRole;
 use jobs::{JobReport, sparse::MergeChunks};
-use queue::{Artefact, Handler, JobContext, JobError, Outcome};
+use queue::{Handler, JobContext, JobError, Outcome};
+use results::ResultFile;
 use service::{compute, objects};
 use sparse::{Reconstruction, Session};
 use std::sync::Arc;
@@ -28,14 +27,13 @@ impl Handler for MergeHandler {
         let store = &resources.store;
         context.progress(0.0, "putting the parts together");
         let (finished, chunks) = self.merge(&context, &payload).await?;
-        let mut results = self.export(&context, &finished).await?;
+        let written = results::write(store, &context, export::files(&finished), 0.3..0.9).await?;
         context.progress(0.9, "comparing with the ground truth");
-        results.extend(self.evaluate(&context, &payload, &finished).await?);
+        let mut last: Vec<ResultFile> = self.evaluate(&payload, &finished).await?.into_iter().collect();
         let merge = resources.job_report(&context, finished.merged.quality.len());
-        let report = RunReport::new(context.run_id().0, &payload, &finished, &chunks, &merge);
-        let report = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
-        results.push(objects::write_result(store, &context, RUN, "application/json", report).await?);
-        Ok(results.into_iter().fold(Outcome::default(), Outcome::artefact))
+        last.push(run_report::file(context.run_id().0, &payload, &finished, &chunks, &merge)?);
+        let last = results::write(store, &context, last, 0.95..1.0).await?;
+        Ok(Outcome::default().artefacts(written).artefacts(last))
     }
 }
 
@@ -83,40 +81,12 @@ impl MergeHandler {
         Ok((Arc::new(finished.await?), reports))
     }
 
-    /// Writes the motion in every format.
-    async fn export(
-        &self,
-        context: &JobContext,
-        finished: &Arc<Finished>,
-    ) -> Result<Vec<Artefact>, JobError> {
-        let mut results = Vec::new();
-        for (done, export) in EXPORTS.iter().enumerate() {
-            context.check()?;
-            context
-                .progress(0.3 + 0.6 * done as f64 / EXPORTS.len() as f64, format!("writing {}", export.name));
-            let finished = finished.clone();
-            let content = compute::run(move || (export.write)(&finished)).await;
-            results.push(
-                objects::write_result(
-                    &self.shared.resources.store,
-                    context,
-                    export.name,
-                    export.media_type,
-                    content,
-                )
-                .await?,
-            );
-        }
-        Ok(results)
-    }
-
     /// The errors against the ground truth, if there is one.
     async fn evaluate(
         &self,
-        context: &JobContext,
         payload: &MergeChunks,
         finished: &Arc<Finished>,
-    ) -> Result<Option<Artefact>, JobError> {
+    ) -> Result<Option<ResultFile>, JobError> {
         let Shared { resources, priors, .. } = &*self.shared;
         let store = &resources.store;
         let files = &payload.request.files;
@@ -132,7 +102,6 @@ impl MergeHandler {
             compute::run(move || evaluate::errors(&fetched, &database, &finished.merged.motion, reading))
                 .await?;
         let Some(errors) = errors else { return Ok(None) };
-        let json = serde_json::to_vec_pretty(&errors).map_err(JobError::retry)?;
-        Ok(Some(objects::write_result(store, context, evaluate::EVALUATION, "application/json", json).await?))
+        Ok(Some(ResultFile::json(evaluate::EVALUATION, &errors)?))
     }
 }

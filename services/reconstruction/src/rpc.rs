@@ -62,7 +62,7 @@ impl Rpc {
     ) -> Result<v1::SolveInverseKinematicsResponse, CallError> {
         ik::call::check(&request)?;
         let model = match &request.performer {
-            Some(Performer::Body(body)) => Some(self.shared.models.of_request(&body.body_model_id).await?.1),
+            Some(Performer::Body(body)) => Some(self.shared.models.for_request(&body.body_model_id).await?.1),
             _ => None,
         };
         let gone = CancellationToken::new();

@@ -1,63 +1,24 @@
-//! `run.json`: all that decided the result, and what it took.
+//! What `run.json` says of a run from control points, beside what it says of all runs.
 
 use crate::feet::{Finished, FootReport};
-use formats::FileRole;
 use jobs::{
-    InputFile, JobReport,
-    motion_database::MotionDatabaseFile,
+    JobReport,
+    run_json::{RUN_JSON, RunReport, Timings},
     sparse::{FittedReport, MergeChunks},
 };
+use queue::JobError;
+use results::{ResultFile, media_type::JSON};
 use serde::Serialize;
-use sparse::{FrameQuality, Parameters};
-use std::collections::BTreeMap;
+use sparse::FrameQuality;
 use uuid::Uuid;
 
-/// Name of the result.
-pub(crate) const RUN: &str = "run.json";
-
 #[derive(Serialize)]
-pub(crate) struct RunReport<'a> {
-    run_id: Uuid,
-    kind: &'static str,
-    code: Code,
-    session: SessionReport<'a>,
-    motion_database: &'a MotionDatabaseFile,
-    parameters: &'a Parameters,
-    /// Nothing in this method is drawn at random.
-    seeds: [u64; 0],
+struct Own<'a> {
     /// The skeleton that was fitted, if the session came without one.
     fitted_skeleton: Option<&'a FittedReport>,
     quality: Summary,
     /// Feet, where they were looked for and found.
     feet: Option<&'a FootReport>,
-    warnings: Vec<String>,
-    timings: Timings<'a>,
-}
-
-#[derive(Serialize)]
-struct Code {
-    version: &'static str,
-    /// Commit that it was built from, when the build said so.
-    commit: Option<&'static str>,
-}
-
-#[derive(Serialize)]
-struct SessionReport<'a> {
-    id: Uuid,
-    name: &'a str,
-    frames: usize,
-    frame_rate_hz: f64,
-    points: &'a [String],
-    mapping: &'a BTreeMap<String, String>,
-    files: Vec<FileReport<'a>>,
-}
-
-#[derive(Serialize)]
-struct FileReport<'a> {
-    name: &'a str,
-    role: FileRole,
-    bytes: u64,
-    blake3: &'a str,
 }
 
 #[derive(Serialize)]
@@ -68,58 +29,35 @@ struct Summary {
     frames_without_measurement: usize,
 }
 
-#[derive(Serialize)]
-struct Timings<'a> {
-    plan: &'a JobReport,
-    chunks: &'a [JobReport],
-    merge: &'a JobReport,
-    /// Computed frames a second over all chunks, warm-up and blending included.
-    frames_per_second: f64,
-}
-
-impl<'a> RunReport<'a> {
-    /// Of a run that has just been merged.
-    pub fn new(
-        run_id: Uuid,
-        job: &'a MergeChunks,
-        finished: &'a Finished,
-        chunks: &'a [JobReport],
-        merge: &'a JobReport,
-    ) -> Self {
-        let request = &job.request;
-        let file =
-            |f: &'a InputFile| FileReport { name: &f.name, role: f.role, bytes: f.bytes, blake3: &f.blake3 };
-        let seconds: f64 = chunks.iter().map(|c| c.seconds).sum();
-        let frames: usize = chunks.iter().map(|c| c.frames).sum();
-        Self {
-            run_id,
-            kind: "reconstruction",
-            code: Code { version: env!("CARGO_PKG_VERSION"), commit: option_env!("MAREY_COMMIT") },
-            session: SessionReport {
-                id: request.session_id,
-                name: &request.session_name,
-                frames: finished.merged.quality.len(),
-                frame_rate_hz: motion_db::FRAME_RATE,
-                points: &job.points,
-                mapping: &request.mapping,
-                files: request.files.iter().map(file).collect(),
-            },
-            motion_database: &request.motion_database,
-            parameters: &request.parameters,
-            seeds: [],
-            fitted_skeleton: job.fitted.as_ref(),
-            quality: summary(&finished.merged.quality),
-            feet: finished.feet.as_ref().map(|feet| &feet.report),
-            warnings: [&job.warnings[..], &doubts(&finished.merged.quality, request.parameters.lost_energy)]
-                .concat(),
-            timings: Timings {
-                plan: &job.plan,
-                chunks,
-                merge,
-                frames_per_second: if seconds > 0.0 { frames as f64 / seconds } else { 0.0 },
-            },
-        }
-    }
+/// `run.json` of a run that has just been merged.
+///
+/// # Errors
+/// To be tried again if it is no JSON.
+pub(crate) fn file(
+    run_id: Uuid,
+    job: &MergeChunks,
+    finished: &Finished,
+    chunks: &[JobReport],
+    merge: &JobReport,
+) -> Result<ResultFile, JobError> {
+    let quality = &finished.merged.quality;
+    let warnings = [&job.warnings[..], &doubts(quality, job.request.parameters.lost_energy)].concat();
+    // warm-up and blending are counted too
+    let timings =
+        Timings::default().one("plan", &job.plan).all("chunks", chunks).one("merge", merge).speed(chunks);
+    let report = RunReport {
+        run_id,
+        warnings: &warnings,
+        timings,
+        frames: Some((quality.len(), motion_db::FRAME_RATE)),
+        points: Some(job.points.iter().map(String::as_str).collect()),
+    };
+    let own = Own {
+        fitted_skeleton: job.fitted.as_ref(),
+        quality: summary(quality),
+        feet: finished.feet.as_ref().map(|feet| &feet.report),
+    };
+    Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(&job.request, own)?))
 }
 
 /// Frames that fit badly or were not measured, from a twentieth of all on.

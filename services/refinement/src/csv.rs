@@ -5,17 +5,7 @@ use std::fmt::Write as _;
 use jobs::file_part;
 use tracking::Stage;
 
-use crate::finished::Finished;
-
-/// What a stage is called in tables.
-pub(crate) fn stage_name(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Unseen => "unseen",
-        Stage::Local => "local",
-        Stage::Particles => "particles",
-        Stage::Misaligned => "misaligned",
-    }
-}
+use crate::{finished::Finished, stage_name::stage_name};
 
 /// `quality.csv`: a row a frame. `frame` counts as the cameras do, `time` is in seconds from the first row, overlaps are
 /// intersections over union, and cells are empty where there is nothing to say.

@@ -1,10 +1,11 @@
-//! What all results of a session are made from.
+//! A session whose person was followed.
 
 use std::sync::Arc;
 
 use body::{BodyModel, Shape};
 use model::{Motion, PointTrajectories};
 use nalgebra::Vector3;
+use results::Kind;
 use tracking::{Chunk, Seam, Stage};
 
 use crate::InputError;
@@ -17,7 +18,7 @@ pub(crate) struct Meeting {
     pub is_blind: bool,
 }
 
-/// A session that was tracked from its first to its last frame.
+/// A session that was followed from its first to its last frame.
 #[derive(Debug)]
 pub(crate) struct Finished {
     pub model: Arc<BodyModel>,
@@ -30,24 +31,52 @@ pub(crate) struct Finished {
     pub cameras: Vec<String>,
     /// frames a second
     pub frame_rate: f64,
+    motion: Motion,
+    /// centres, missing where nobody was found
+    joints: PointTrajectories,
 }
 
 impl Finished {
-    pub fn poses(&self) -> Vec<Vec<f64>> {
-        self.tracked.frames.iter().map(|tracked| tracked.pose.clone()).collect()
-    }
-
-    pub fn motion(&self) -> Result<Motion, InputError> {
-        Ok(self.model.motion(&self.shape, &self.poses(), self.frame_rate)?)
-    }
-
-    /// Centres of the joints; missing where nobody was found.
-    pub fn joints(&self) -> Result<PointTrajectories, InputError> {
-        let names = self.model.rig().joints().iter().map(|joint| joint.name.clone()).collect();
-        let positions = self.tracked.frames.iter().flat_map(|tracked| {
+    /// From the frames of all chunks.
+    ///
+    /// # Errors
+    /// If they are no motion of the body.
+    pub fn new(
+        model: Arc<BodyModel>,
+        shape: Shape,
+        tracked: Chunk,
+        meetings: Vec<Meeting>,
+        cameras: Vec<String>,
+        frame_rate: f64,
+    ) -> Result<Self, InputError> {
+        let motion = model.motion(&shape, &poses(&tracked), frame_rate)?;
+        let names = model.rig().joints().iter().map(|joint| joint.name.clone()).collect();
+        let positions = tracked.frames.iter().flat_map(|tracked| {
             let is_seen = tracked.stage != Stage::Unseen;
             tracked.joints.iter().map(move |joint| if is_seen { *joint } else { Vector3::repeat(f64::NAN) })
         });
-        Ok(PointTrajectories::new(names, self.frame_rate, positions.collect())?)
+        let joints = PointTrajectories::new(names, frame_rate, positions.collect())?;
+        Ok(Self { model, shape, tracked, meetings, cameras, frame_rate, motion, joints })
+    }
+
+    /// The body's poses, shape `[frames][dof]`.
+    pub fn poses(&self) -> Vec<Vec<f64>> {
+        poses(&self.tracked)
+    }
+}
+
+fn poses(tracked: &Chunk) -> Vec<Vec<f64>> {
+    tracked.frames.iter().map(|tracked| tracked.pose.clone()).collect()
+}
+
+impl results::Finished for Finished {
+    const KIND: Kind = Kind::Tracking;
+
+    fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    fn joints(&self) -> Option<&PointTrajectories> {
+        Some(&self.joints)
     }
 }

@@ -12,13 +12,14 @@
 
 mod csv;
 mod error;
+mod export;
 mod finished;
 mod merge_job;
 mod options;
 mod refine;
 mod report;
-mod results;
 mod rpc;
+mod stage_name;
 mod track_job;
 
 pub use error::InputError;

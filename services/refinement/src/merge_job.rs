@@ -7,24 +7,21 @@ use jobs::{
     JobReport,
     multi_view::{MergeTracks, TRACKED, TrackingSession},
     named,
-    run_json::{MultiViewReport, TrackingParts},
 };
-use queue::{Artefact, Handler, JobContext, JobError, Outcome};
+use queue::{Handler, JobContext, JobError, Outcome};
+use results::media_type::BINARY;
 use service::{compute, objects};
 use tracking::{Chunk, Stage, hold_unseen, merge};
 
 use crate::{
-    InputError, Shared,
+    InputError, Shared, export,
     finished::{Finished, Meeting},
     report,
-    results::EXPORTS,
     track_job::{chunk_name, report_name},
 };
 
 /// Largest artefact of a chunk, bytes: its longest has some thousand frames of a kilobyte.
 const MAX_CHUNK_BYTES: u64 = 256 << 20;
-/// Name of the result with everything that decided the others.
-const RUN: &str = "run.json";
 
 pub(crate) struct MergeHandler {
     pub shared: Arc<Shared>,
@@ -42,23 +39,12 @@ impl Handler for MergeHandler {
         let finished = Arc::new(finished);
         let packed = finished.clone();
         let tracked = compute::run(move || packed.tracked.to_bytes()).await.map_err(InputError::from)?;
-        let mut written =
-            vec![objects::write(store, &context, TRACKED, "application/octet-stream", tracked).await?];
-        written.extend(self.export(&context, &finished).await?);
+        let tracked = objects::write(store, &context, TRACKED, BINARY, tracked).await?;
+        let written = results::write(store, &context, export::files(&finished), 0.2..0.95).await?;
         let merge = resources.job_report(&context, finished.tracked.frames.len());
-        let warnings = [&session.warnings[..], &report::doubts(&finished)].concat();
-        let parts = TrackingParts { found: report::found(&finished), chunks: &chunks, merge: &merge };
-        let report = MultiViewReport::new(
-            context.run_id().0,
-            &session.request,
-            (&session.plan, &session.fit_shape),
-            &session.cameras,
-            &warnings,
-            Some(parts),
-        );
-        let report = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
-        written.push(objects::write_result(store, &context, RUN, "application/json", report).await?);
-        Ok(written.into_iter().fold(Outcome::default(), Outcome::artefact))
+        let run = report::run_json(context.run_id().0, &session, &finished, &chunks, &merge)?;
+        let run = results::write_one(store, &context, run).await?;
+        Ok(Outcome::default().artefact(tracked).artefacts(written).artefact(run))
     }
 }
 
@@ -96,38 +82,10 @@ impl MergeHandler {
             hold_unseen(&model, &shape, &mut merged.frames);
             let cameras = session.clips.iter().map(|clips| clips.camera.name.clone()).collect();
             let frame_rate = session.frame_rate;
-            Ok(Finished {
-                model,
-                shape,
-                tracked: Chunk { frames: merged.frames },
-                meetings,
-                cameras,
-                frame_rate,
-            })
+            let tracked = Chunk { frames: merged.frames };
+            Finished::new(model, shape, tracked, meetings, cameras, frame_rate)
         });
         Ok((finished.await?, reports))
-    }
-
-    /// Writes the motion in every format, one after the other.
-    async fn export(
-        &self,
-        context: &JobContext,
-        finished: &Arc<Finished>,
-    ) -> Result<Vec<Artefact>, JobError> {
-        let mut written = Vec::new();
-        for (done, export) in EXPORTS.iter().enumerate() {
-            context.check()?;
-            context.progress(
-                0.2 + 0.75 * done as f64 / EXPORTS.len() as f64,
-                format!("writing {}", export.name),
-            );
-            let finished = finished.clone();
-            let content = compute::run(move || (export.write)(&finished)).await?;
-            let store = &self.shared.resources.store;
-            written
-                .push(objects::write_result(store, context, export.name, export.media_type, content).await?);
-        }
-        Ok(written)
     }
 }
 

@@ -1,12 +1,20 @@
-//! What `run.json` says about a person who was tracked, and what an animator should know of it.
+//! What `run.json` says of a person who was followed, and what an animator should know of it.
 
 use body::Limb;
+use jobs::{
+    JobReport,
+    multi_view::{CameraReport, TrackingSession},
+    run_json::{RUN_JSON, RunReport, Timings},
+};
+use queue::JobError;
+use results::{ResultFile, media_type::JSON};
 use serde_json::{Value, json};
 use tracking::{Stage, Tracked};
+use uuid::Uuid;
 
 use crate::{
-    csv::stage_name,
     finished::{Finished, Meeting},
+    stage_name::stage_name,
 };
 
 /// Share of frames with a misaligned limb from which on a user had better look.
@@ -19,7 +27,7 @@ const WORSE: f64 = 0.08;
 const LISTED: usize = 5;
 
 /// The figures.
-pub(crate) fn found(finished: &Finished) -> Value {
+fn found(finished: &Finished) -> Value {
     let frames = &finished.tracked.frames;
     let count = |stage: Stage| frames.iter().filter(|tracked| tracked.stage == stage).count();
     let stages = [Stage::Local, Stage::Particles, Stage::Misaligned, Stage::Unseen];
@@ -42,6 +50,34 @@ pub(crate) fn found(finished: &Finished) -> Value {
     })
 }
 
+/// `run.json`.
+///
+/// # Errors
+/// To be tried again if it is no JSON.
+pub(crate) fn run_json(
+    run_id: Uuid,
+    session: &TrackingSession,
+    finished: &Finished,
+    chunks: &[JobReport],
+    merge: &JobReport,
+) -> Result<ResultFile, JobError> {
+    let warnings = [&session.warnings[..], &doubts(finished)].concat();
+    let timings = Timings::default()
+        .one("plan", &session.plan)
+        .all("cameras", session.cameras.iter().map(|camera| &camera.job))
+        .one("initialise", &session.fit_shape)
+        .all("chunks", chunks)
+        .one("merge", merge)
+        .speed(chunks);
+    let own = json!({
+        "cameras": session.cameras.iter().map(CameraReport::summary).collect::<Vec<_>>(),
+        "tracking": found(finished),
+    });
+    let frames = Some((finished.tracked.frames.len(), finished.frame_rate));
+    let report = RunReport { run_id, warnings: &warnings, timings, frames, points: None };
+    Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(&session.request, own)?))
+}
+
 /// Mean overlap of every camera, where it sees somebody.
 fn overlaps(finished: &Finished) -> Vec<Option<f64>> {
     let overlap = |camera: usize| {
@@ -57,7 +93,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// What is doubtful about the result, in words that say what to do.
-pub(crate) fn doubts(finished: &Finished) -> Vec<String> {
+fn doubts(finished: &Finished) -> Vec<String> {
     let frames = &finished.tracked.frames;
     let mut doubts = Vec::new();
     let unseen = numbers(frames, |tracked| tracked.stage == Stage::Unseen);

@@ -23,7 +23,7 @@ impl Rpc {
 
     async fn refine(&self, request: v1::RefineFrameRequest) -> Result<v1::RefineFrameResponse, CallError> {
         refine::check(&request)?;
-        let (_, model) = self.shared.models.of_request(&request.body_model_id).await?;
+        let (_, model) = self.shared.models.for_request(&request.body_model_id).await?;
         let stop = StopOnDrop::default();
         let flag = stop.flag();
         self.slots.run(move || refine::refine(&model, &request, &flag)).await

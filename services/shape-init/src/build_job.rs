@@ -7,8 +7,10 @@ use formats::archive::{self, Entry, Limits};
 use jobs::{
     InputFile,
     body_model::{BodyModelName, BuildBodyModel},
+    run_json::{RUN_JSON, RunReport, Timings},
 };
 use queue::{Handler, JobContext, JobError, Outcome};
+use results::{ResultFile, media_type::JSON};
 use serde::Serialize;
 use serde_json::{Value, json};
 use service::{FileError, compute, objects};
@@ -78,8 +80,23 @@ impl Handler for BuildHandler {
         let key =
             key::body_model(id, context.id().0, context.lease_number().0, MODEL).map_err(JobError::retry)?;
         let stored = store.put(&key, bytes.into()).await.map_err(JobError::retry)?;
-        let summary = serde_json::to_vec_pretty(&contents).map_err(JobError::retry)?;
-        let summary = objects::write_result(store, &context, SUMMARY, "application/json", summary).await?;
+        let report = self.shared.resources.job_report(&context, 0);
+        let run = RunReport {
+            run_id: context.run_id().0,
+            warnings: &contents.warnings,
+            timings: Timings::default().one("build", &report),
+            frames: None,
+            points: None,
+        };
+        let own = json!({
+            "num_vertices": learned.model.num_vertices(),
+            "num_components": learned.model.num_components(),
+            "bytes": stored.bytes,
+            "blake3": stored.blake3,
+        });
+        let run = run.to_json(&request, json!({ "built": own }))?;
+        let files = vec![ResultFile::json(SUMMARY, &contents)?, ResultFile::ready(RUN_JSON, JSON, run)];
+        let written = results::write(store, &context, files, 0.97..1.0).await?;
         let ready = Ready {
             name: request.body_model,
             stored,
@@ -87,7 +104,7 @@ impl Handler for BuildHandler {
             num_components: learned.model.num_components(),
             contents,
         };
-        Ok(Outcome::default().artefact(summary).on_complete(move |connection| {
+        Ok(Outcome::default().artefacts(written).on_complete(move |connection| {
             let ready = ready.clone();
             Box::pin(async move { set_ready(connection, &ready).await })
         }))

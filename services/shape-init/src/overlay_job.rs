@@ -14,10 +14,11 @@ use jobs::{
 };
 use model::{Camera, Image};
 use queue::{Handler, JobContext, JobError, Outcome};
-use service::{
-    compute::{self, StopOnDrop},
-    objects,
+use results::{
+    ResultFile,
+    media_type::{MP4, TEXT},
 };
+use service::compute::{self, StopOnDrop};
 use tempfile::TempDir;
 use tracking::{Chunk, Tracked};
 use video::{FrameWriter, WriteOptions};
@@ -60,7 +61,6 @@ impl Handler for OverlayHandler {
 
     async fn run(&self, context: JobContext, payload: DrawOverlay) -> Result<Outcome, JobError> {
         let Shared { resources, models } = &*self.shared;
-        let store = &resources.store;
         let session = tracking_session(resources, &payload.session).await?;
         let (Some(camera), Some(clips)) =
             (session.cameras.get(payload.camera), session.clips.get(payload.camera))
@@ -100,21 +100,17 @@ impl Handler for OverlayHandler {
         let drawn = compute::run(move || draw(&scene, &to, &watched, &flag)).await;
         context.check()?;
         let file = match drawn {
-            Ok(()) => {
-                objects::write_result_file(store, &context, &format!("{stem}.mp4"), "video/mp4", &path)
-                    .await?
-            }
+            Ok(()) => ResultFile::on_disk(format!("{stem}.mp4"), MP4, path),
             // The motion is there all the same.
             Err(DrawError::NoEncoder(error)) => {
                 let text = format!("no overlay video of camera {name}: {error}\n");
-                let name = format!("{stem}.txt");
-                objects::write_result(store, &context, &name, "text/plain; charset=utf-8", text).await?
+                ResultFile::ready(format!("{stem}.txt"), TEXT, text.into_bytes())
             }
             Err(DrawError::Input(error)) => return Err(error.into()),
             Err(DrawError::Video(error)) => return Err(JobError::retry(error)),
             Err(DrawError::Stopped) => return Err(JobError::Stopped),
         };
-        Ok(Outcome::default().artefact(file))
+        Ok(Outcome::default().artefact(results::write_one(&resources.store, &context, file).await?))
     }
 }
 

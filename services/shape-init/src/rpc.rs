@@ -27,7 +27,7 @@ impl Rpc {
 
     async fn sample(&self, request: v1::SampleBodyRequest) -> Result<v1::SampleBodyResponse, CallError> {
         let (_, model) =
-            self.shared.models.of_request(&request.body_model_id).await.map_err(CallError::from)?;
+            self.shared.models.for_request(&request.body_model_id).await.map_err(CallError::from)?;
         let sampled = self.slots.run(move || {
             let described = Described {
                 alpha: &request.alpha,
@@ -87,7 +87,7 @@ impl ShapeInit for Rpc {
         request: Request<v1::DescribeBodyModelRequest>,
     ) -> Result<Response<v1::DescribeBodyModelResponse>, Status> {
         let which = request.into_inner().body_model_id;
-        let (file, model) = self.shared.models.of_request(&which).await.map_err(CallError::from)?;
+        let (file, model) = self.shared.models.for_request(&which).await.map_err(CallError::from)?;
         let rig = model.rig();
         let parent = |parent: Option<usize>| parent.map_or(-1, |p| i32::try_from(p).unwrap_or(i32::MAX));
         let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);

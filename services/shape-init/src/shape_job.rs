@@ -3,39 +3,39 @@
 use std::sync::Arc;
 
 use body::BodyModel;
-use camera_jobs::{Silhouettes, reports};
+use camera_jobs::reports;
 use formats::image_files;
 use jobs::{
-    Object, file_part,
+    JobReport, Object, file_part,
     multi_view::{CameraClips, CameraReport, FitShape, TrackingSession, picture_name},
-    run_json::MultiViewReport,
+    run_json::{RUN_JSON, RunReport, Timings},
 };
 use model::Image;
 use multi_view::Parameters;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
+use results::{ResultFile, media_type::JSON};
+use serde_json::json;
 use service::{compute, objects};
 use shape_fit::Fit;
+use uuid::Uuid;
 
 use crate::{
     InputError, Shared,
     children::{FIT_SHOWN, children},
     drawing::{Drawer, FITS},
-    fit::{self, Found, Moment},
+    export::{self, Finished},
+    find::Search,
+    fit::{Found, Moment},
     hull::hull,
-    results::{self, ResultFile},
     shape_report::shape_report,
 };
 
-/// Name of the result with everything that decided the others.
-const RUN: &str = "run.json";
 /// Largest picture, bytes.
 const MAX_PICTURE_BYTES: u64 = 256 << 20;
 /// Below this a user had better look.
 const LOW_CONFIDENCE: f64 = 0.5;
 /// Name of the artefact with all that the jobs after this one are given.
 const SESSION: &str = "tracking.json";
-/// Frames, spread over the session, in which a person is looked for who was not in the first.
-const LATER_TRIES: usize = 7;
 /// Frames a second where no file tells.
 const FRAME_RATE: f64 = 30.0;
 
@@ -49,9 +49,10 @@ impl Handler for ShapeHandler {
     async fn run(&self, context: JobContext, job: FitShape) -> Result<Outcome, JobError> {
         let FitShape { request, mut warnings, plan } = job;
         let Shared { resources, models } = &*self.shared;
-        let shown = if request.parameters.track { FIT_SHOWN } else { 1.0 };
-        let progress = |share: f64, phrase: &str| context.progress(shown * share, phrase);
-        progress(0.0, "reading the silhouettes");
+        let store = &resources.store;
+        let parameters = &request.parameters;
+        let shown = if parameters.track { FIT_SHOWN } else { 1.0 };
+        context.progress(0.0, "reading the silhouettes");
         let artefacts = resources.artefacts_before(&context).await?;
         let cameras = reports(resources, &artefacts).await?;
         warnings.extend(cameras.iter().flat_map(|camera| camera.warnings.iter().cloned()));
@@ -61,151 +62,70 @@ impl Handler for ShapeHandler {
         let end_frame = end_frame(&cameras, &mut warnings);
         let model = models.get(&request.body_model).await?;
         context.check()?;
-        progress(0.1, "finding pose and shape");
-        let parameters = &request.parameters;
-        let found = self.find(&context, &model, parameters, &clips, end_frame).await;
-        let found = found.map_err(|error| explained(error, &cameras))?;
+        context.progress(0.1 * shown, "finding pose and shape");
+        let search = Search {
+            resources,
+            context: &context,
+            model: &model,
+            parameters,
+            cameras: &cameras,
+            clips: &clips,
+            end_frame,
+        };
+        let Found { moments, fits, left_out } = search.find().await?;
         context.check()?;
-        let Found { moments, fits, left_out } = found;
         let (moments, fits) = (Arc::new(moments), Arc::new(fits));
         warnings.extend(left_out);
         warnings.extend(doubts(&fits));
-        progress(0.7, "carving the visual hull");
+        context.progress(0.7 * shown, "carving the visual hull");
         let (seen, cell_m) = (moments.clone(), parameters.hull_voxel_m);
         let carved = compute::run(move || seen.first().map(|first| hull(&first.views, cell_m))).await;
         context.check()?;
         let mut files = Vec::new();
         match carved {
-            Some(Ok(carved)) => files.push(results::mesh("hull.ply", &carved.mesh)),
+            Some(Ok(carved)) => files.push(export::mesh("hull.ply", carved.mesh)),
             // The body was found all the same.
             Some(Err(error)) => warnings.push(format!("no visual hull: {error}")),
             None => {}
         }
-        progress(0.8, "writing the body");
         let frame_rate = frame_rate(parameters, &cameras, &mut warnings);
-        files.extend(self.body(&model, &moments, &fits, frame_rate, &warnings).await?);
-        if parameters.track {
-            // those of the whole motion come later
-            files.retain(|file| ![results::BODY, results::POSE].contains(&file.name.as_str()));
-        }
-        let mut artefacts_of_results = Vec::new();
-        for file in files {
-            artefacts_of_results.push(self.write(&context, file).await?);
-        }
+        files.extend(body(&model, &moments, &fits, frame_rate, parameters.track, &warnings).await?);
+        let mut written = results::write(store, &context, files, 0.8 * shown..0.85 * shown).await?;
         for (index, camera) in cameras.iter().enumerate() {
             context.check()?;
-            progress(0.85 + 0.14 * index as f64 / cameras.len() as f64, "drawing overlays");
+            let share = 0.85 + 0.14 * index as f64 / cameras.len() as f64;
+            context.progress(share * shown, "drawing overlays");
             if let Some(file) = self.overlay(camera, &artefacts, &moments, (&model, &fits)).await? {
-                artefacts_of_results.push(self.write(&context, file).await?);
+                written.push(results::write_one(store, &context, file).await?);
             }
         }
+        let outcome = Outcome::default().artefacts(written);
         let report = resources.job_report(&context, moments.len());
-        let mut outcome = artefacts_of_results.into_iter().fold(Outcome::default(), Outcome::artefact);
-        if parameters.track {
-            let session = TrackingSession {
-                alpha: fits.first().map_or(Vec::new(), |fit| fit.alpha.clone()),
-                first_frame: parameters.first_frame,
-                plan,
-                fit_shape: report,
-                clips,
-                cameras,
-                end_frame,
-                frame_rate,
-                warnings,
-                request,
-            };
-            let content = serde_json::to_vec(&session).map_err(JobError::retry)?;
-            let artefact =
-                objects::write(&resources.store, &context, SESSION, "application/json", content).await?;
-            let children = children(&session, &Object::from(&artefact))?;
-            outcome = outcome.artefact(artefact).children(children);
-        } else {
-            let report = MultiViewReport::new(
-                context.run_id().0,
-                &request,
-                (&plan, &report),
-                &cameras,
-                &warnings,
-                None,
-            );
-            let content = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
-            let run = ResultFile { name: RUN.to_owned(), media_type: "application/json", content };
-            outcome = outcome.artefact(self.write(&context, run).await?);
+        if !parameters.track {
+            let job = FitShape { request, warnings, plan };
+            let run = run_json(context.run_id().0, &job, &cameras, (moments.len(), frame_rate), &report)?;
+            return Ok(outcome.artefact(results::write_one(store, &context, run).await?));
         }
-        Ok(outcome)
+        let session = TrackingSession {
+            alpha: fits.first().map_or(Vec::new(), |fit| fit.alpha.clone()),
+            first_frame: parameters.first_frame,
+            plan,
+            fit_shape: report,
+            clips,
+            cameras,
+            end_frame,
+            frame_rate,
+            warnings,
+            request,
+        };
+        let content = serde_json::to_vec(&session).map_err(JobError::retry)?;
+        let artefact = objects::write(store, &context, SESSION, JSON, content).await?;
+        let children = children(&session, &Object::from(&artefact))?;
+        Ok(outcome.artefact(artefact).children(children))
     }
 }
 
 impl ShapeHandler {
-    /// Pose and shape in the frames that were asked for. Where the person is to be followed and is not in these yet, they are
-    /// looked for in others.
-    async fn find(
-        &self,
-        context: &JobContext,
-        model: &Arc<BodyModel>,
-        parameters: &Parameters,
-        clips: &[CameraClips],
-        end_frame: usize,
-    ) -> Result<Found, FindError> {
-        let wanted = parameters.shape_fit_frames(end_frame);
-        let first = match self.find_in(model, parameters, clips, &wanted).await {
-            Err(FindError::Nobody(error)) if parameters.track => error,
-            found => return found,
-        };
-        let spread = Parameters { shape_frames: LATER_TRIES + 1, shape_step: None, ..parameters.clone() };
-        for frame in spread.shape_fit_frames(end_frame).into_iter().filter(|frame| !wanted.contains(frame)) {
-            context.check()?;
-            match self.find_in(model, parameters, clips, &[frame]).await {
-                Err(FindError::Nobody(_)) => {}
-                Err(error) => return Err(error),
-                Ok(mut found) => {
-                    found.left_out.push(format!("the shape is that of frame {frame}, as before: {first}"));
-                    return Ok(found);
-                }
-            }
-        }
-        Err(FindError::Nobody(first))
-    }
-
-    async fn find_in(
-        &self,
-        model: &Arc<BodyModel>,
-        parameters: &Parameters,
-        clips: &[CameraClips],
-        frames: &[usize],
-    ) -> Result<Found, FindError> {
-        let mut moments = Vec::new();
-        for &frame in frames {
-            let silhouettes = Silhouettes::read(&self.shared.resources, clips, frame..frame + 1).await?;
-            moments.push(Moment { frame, views: silhouettes.views(frame).map_err(JobError::retry)? });
-        }
-        let (model, parameters) = (model.clone(), parameters.clone());
-        let found = compute::run(move || fit::fit(&model, moments, &parameters)).await;
-        found.map_err(FindError::Nobody)
-    }
-
-    async fn body(
-        &self,
-        model: &Arc<BodyModel>,
-        moments: &Arc<Vec<Moment>>,
-        fits: &Arc<Vec<Fit>>,
-        frame_rate: f64,
-        warnings: &[String],
-    ) -> Result<Vec<ResultFile>, JobError> {
-        let (model, moments, fits, warnings) =
-            (model.clone(), moments.clone(), fits.clone(), warnings.to_vec());
-        let made = compute::run(move || -> Result<_, InputError> {
-            let alpha = fits.first().map_or(&[][..], |fit| &fit.alpha);
-            let shape = model.shape(alpha);
-            let report = shape_report(&model, &shape, &moments, &fits, &warnings);
-            Ok((results::body_files(&model, &shape, &fits, frame_rate)?, report))
-        });
-        let (mut files, report) = made.await?;
-        let content = serde_json::to_vec_pretty(&report).map_err(JobError::retry)?;
-        files.push(ResultFile { name: "shape.json".to_owned(), media_type: "application/json", content });
-        Ok(files)
-    }
-
     /// The outline of the body over what a camera saw in the first frame.
     async fn overlay(
         &self,
@@ -227,35 +147,55 @@ impl ShapeHandler {
             if let Some(first) = fits.first() {
                 Drawer::new(&model, &own).outline(&mut picture, &first.mesh.vertices, FITS);
             }
-            Ok(results::picture(name, &picture))
+            Ok(export::picture(name, picture))
         });
         Ok(Some(drawn.await?))
     }
-
-    async fn write(&self, context: &JobContext, file: ResultFile) -> Result<Artefact, JobError> {
-        objects::write_result(
-            &self.shared.resources.store,
-            context,
-            &file.name,
-            file.media_type,
-            file.content,
-        )
-        .await
-    }
 }
 
-/// Why no body was found.
-enum FindError {
-    /// nobody is there, or they can't be recognised
-    Nobody(InputError),
-    /// something else
-    Job(JobError),
+/// What people get of the person: mesh and shape, and where nobody follows them the body in its poses.
+async fn body(
+    model: &Arc<BodyModel>,
+    moments: &Arc<Vec<Moment>>,
+    fits: &Arc<Vec<Fit>>,
+    frame_rate: f64,
+    is_followed: bool,
+    warnings: &[String],
+) -> Result<Vec<ResultFile>, JobError> {
+    let (model, moments, fits, warnings) = (model.clone(), moments.clone(), fits.clone(), warnings.to_vec());
+    let made = compute::run(move || -> Result<_, InputError> {
+        let shape = model.shape(fits.first().map_or(&[][..], |fit| &fit.alpha));
+        let report = shape_report(&model, &shape, &moments, &fits, &warnings);
+        let mesh = fits.first().map(|first| export::mesh("mesh.ply", first.mesh.clone()));
+        let posed = if is_followed {
+            // those of the whole motion come later
+            Vec::new()
+        } else {
+            export::files(Finished::new(model, shape, &fits, frame_rate)?)
+        };
+        Ok((posed, mesh, report))
+    });
+    let (mut files, mesh, report) = made.await?;
+    files.extend(mesh);
+    files.push(ResultFile::json("shape.json", &report)?);
+    Ok(files)
 }
 
-impl From<JobError> for FindError {
-    fn from(error: JobError) -> Self {
-        Self::Job(error)
-    }
+/// `run.json` of a run whose person nobody follows.
+fn run_json(
+    run_id: Uuid,
+    job: &FitShape,
+    cameras: &[CameraReport],
+    frames: (usize, f64),
+    report: &JobReport,
+) -> Result<ResultFile, JobError> {
+    let timings = Timings::default()
+        .one("plan", &job.plan)
+        .all("cameras", cameras.iter().map(|camera| &camera.job))
+        .one("initialise", report);
+    let own = json!({ "cameras": cameras.iter().map(CameraReport::summary).collect::<Vec<_>>() });
+    let run = RunReport { run_id, warnings: &job.warnings, timings, frames: Some(frames), points: None };
+    Ok(ResultFile::ready(RUN_JSON, JSON, run.to_json(&job.request, own)?))
 }
 
 /// One past the last frame that all cameras have.
@@ -292,34 +232,6 @@ fn frame_rate(parameters: &Parameters, cameras: &[CameraReport], warnings: &mut 
         ));
     }
     rate
-}
-
-/// Why no body was found, with what is known of the cameras: poor silhouettes are the usual reason.
-fn explained(error: FindError, cameras: &[CameraReport]) -> JobError {
-    let error = match error {
-        FindError::Nobody(error) => error,
-        FindError::Job(error) => return error,
-    };
-    let mut message = error.to_string();
-    let advice = cameras.iter().filter_map(|camera| {
-        let quality = camera.quality.as_ref().filter(|quality| !quality.advice.is_empty())?;
-        let said: Vec<String> = quality.advice.iter().take(2).map(ToString::to_string).collect();
-        Some(format!(
-            "camera {} (silhouettes {:.2} of 1): {}",
-            camera.camera.name,
-            quality.score,
-            said.join("; ")
-        ))
-    });
-    let advice: Vec<String> = advice.collect();
-    if !advice.is_empty() {
-        message.push_str(". Of the cameras: ");
-        message.push_str(&advice.join(". "));
-    }
-    message.push_str(
-        ". The pictures silhouette_CAMERA.png among the results show what was taken for the person",
-    );
-    JobError::give_up(message, format!("{error:?}"))
 }
 
 /// What a user should know of a fit that did not fail.

@@ -15,6 +15,7 @@ use jobs::{
 use model::Image;
 use multi_view::CameraRecord;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
+use results::{ResultFile, media_type::PNG};
 use service::{FileError, compute, objects};
 use tempfile::TempDir;
 use tokio::sync::mpsc;
@@ -155,12 +156,12 @@ impl SilhouettesHandler {
                 })
                 .await;
                 let name = picture_name(payload.index, frame);
-                written.artefacts.push(objects::write(store, context, &name, "image/png", plain).await?);
+                written.artefacts.push(objects::write(store, context, &name, PNG, plain).await?);
                 // A run that fails later shows here what its cameras saw.
                 let name = format!("silhouette_{}.png", file_part(&payload.camera.name, payload.index));
                 written
                     .artefacts
-                    .push(objects::write_result(store, context, &name, "image/png", drawn).await?);
+                    .push(results::write_one(store, context, ResultFile::ready(name, PNG, drawn)).await?);
             }
         }
         Ok(())

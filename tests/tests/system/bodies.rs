@@ -8,7 +8,7 @@ use tests::{Api, System};
 use crate::cameras::tar;
 
 /// Scans made of the shipped model: as many bodies, all different.
-fn scans(count: usize) -> Vec<(String, Vec<u8>)> {
+pub(crate) fn scans(count: usize) -> Vec<(String, Vec<u8>)> {
     let model = BodyModel::shipped();
     let scan = |index: usize| {
         // numbers that are spread and the same every time
@@ -18,15 +18,21 @@ fn scans(count: usize) -> Vec<(String, Vec<u8>)> {
     (0..count).map(scan).collect()
 }
 
-fn build(api: &Api, name: &str, files: &[(String, Vec<u8>)]) -> Result<(String, serde_json::Value)> {
+/// Builds a model: its path, that of the run, and how the run ended.
+pub(crate) fn build(
+    api: &Api,
+    name: &str,
+    files: &[(String, Vec<u8>)],
+) -> Result<(String, String, serde_json::Value)> {
     let model = api.make("/v1/body-models", &json!({ "name": name }))?;
     let path = format!("/v1/body-models/{}", model["id"].as_str().context("no id")?);
     let files: Vec<(&str, &[u8])> =
         files.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice())).collect();
     api.upload(&format!("{path}/files/scans.tar"), &tar(&files)?)?;
     let run = api.make(&format!("{path}/build"), &json!({ "components": 6 }))?;
-    let end = api.wait(&format!("/v1/runs/{}", run["id"].as_str().context("no id")?))?;
-    Ok((path, end))
+    let run = format!("/v1/runs/{}", run["id"].as_str().context("no id")?);
+    let end = api.wait(&run)?;
+    Ok((path, run, end))
 }
 
 #[test]
@@ -54,7 +60,7 @@ fn the_shipped_model_is_always_there() -> Result<()> {
 fn a_model_is_learned_from_scans_and_then_never_changes() -> Result<()> {
     let system = System::with_shape_init(1)?;
     let api = system.project("p")?;
-    let (path, end) = build(&api, "people", &scans(8))?;
+    let (path, _, end) = build(&api, "people", &scans(8))?;
     ensure!(end["state"] == "succeeded", "{end}");
     let shown = api.get("/v1/body-models/people")?.json();
     assert_eq!(
@@ -84,7 +90,7 @@ fn a_bad_scan_is_refused_with_its_file() -> Result<()> {
     let mut mesh = formats::ply::read(&files[2].1)?.value;
     mesh.vertices.iter_mut().for_each(|vertex| vertex.x = -vertex.x);
     files[2].1 = formats::ply::write(&mesh);
-    let (path, end) = build(&api, "people", &files)?;
+    let (path, _, end) = build(&api, "people", &files)?;
     assert_eq!(end["state"], "failed");
     let error = end["error"].as_str().unwrap_or_default();
     assert!(error.contains("s02.ply") && error.contains("mirrored"), "{error}");

@@ -27,10 +27,10 @@ const MEASURED: [(&str, &str); 6] = [
 const INNER: [&str; 4] = ["l_elbow", "r_elbow", "l_knee", "r_knee"];
 
 /// A capture that we have drawn ourselves.
-struct Capture {
-    calibration: Vec<u8>,
-    masks: Vec<u8>,
-    points: Vec<u8>,
+pub(crate) struct Capture {
+    pub(crate) calibration: Vec<u8>,
+    pub(crate) masks: Vec<u8>,
+    pub(crate) points: Vec<u8>,
     /// true elbows and knees, shape `[frames][4]`
     inner: Vec<[Vector3<f64>; 4]>,
 }
@@ -48,7 +48,7 @@ fn pose(model: &BodyModel, seconds: f64) -> Vec<f64> {
     pose
 }
 
-fn capture(num_cameras: usize) -> Result<Capture> {
+pub(crate) fn capture(num_cameras: usize) -> Result<Capture> {
     let model = BodyModel::shipped();
     let wanted = Wanted { stature_m: Some(STATURE_M), ..Wanted::default() };
     let shape = model.shape(&model.alpha_for(&wanted)?);

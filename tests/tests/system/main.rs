@@ -12,6 +12,7 @@ mod inverse_kinematics;
 mod live;
 mod markers;
 mod requests;
+mod run_json;
 mod runs;
 mod tracking;
 mod uploads;

@@ -18,7 +18,7 @@ const CAMERAS: usize = 4;
 const FRAMES: usize = 9;
 
 /// A take of a drawn person who lifts their arms and walks off: a calibration, masks, and where the joints were.
-struct Take {
+pub(crate) struct Take {
     calibration: String,
     masks: Vec<u8>,
     cameras: Vec<Camera>,
@@ -29,7 +29,7 @@ struct Take {
 }
 
 /// `empty`: frames in front in which nobody is.
-fn take(empty: usize) -> Result<Take> {
+pub(crate) fn take(empty: usize) -> Result<Take> {
     let model = BodyModel::shipped();
     let shape = model.shape(&[0.7, -0.4]);
     let cameras = Ring { cameras: CAMERAS, size: 402, focal: 530.0, ..Ring::default() }.cameras();
@@ -103,7 +103,7 @@ impl Take {
         )
     }
 
-    fn upload(&self, api: &Api) -> Result<String> {
+    pub(crate) fn upload(&self, api: &Api) -> Result<String> {
         let files = [("calibration.json", self.calibration.as_bytes()), ("masks.tar", self.masks.as_slice())];
         api.session("take", &files)
     }

@@ -100,16 +100,33 @@ pub struct CameraReport {
     pub job: JobReport,
 }
 
-/// Frames a second at which all cameras recorded, if a file tells; with a warning where they differ.
-pub fn frame_rate(cameras: &[CameraReport], warnings: &mut Vec<String>) -> Option<f64> {
-    let mut known = cameras.iter().filter_map(|camera| Some((&camera.camera.name, camera.frame_rate?)));
-    let (first, rate) = known.next()?;
-    if let Some((other, found)) = known.find(|(_, found)| (found - rate).abs() > 0.01 * rate) {
-        warnings.push(format!(
-            "camera {other} has {found} frames a second, camera {first} {rate}: all are taken to have {rate}"
-        ));
+/// What `run.json` says of a camera.
+#[derive(Debug, Clone, Serialize)]
+pub struct CameraSummary<'a> {
+    name: &'a str,
+    source: &'a str,
+    plate: Option<&'a str>,
+    size: [u32; 2],
+    end_frame: usize,
+    frame_rate_hz: Option<f64>,
+    quality: Option<&'a CameraQuality>,
+    warnings: &'a [String],
+}
+
+impl CameraReport {
+    /// For people.
+    pub fn summary(&self) -> CameraSummary<'_> {
+        CameraSummary {
+            name: &self.camera.name,
+            source: &self.source.name,
+            plate: self.plate.as_deref(),
+            size: self.camera.size,
+            end_frame: self.end_frame,
+            frame_rate_hz: self.frame_rate,
+            quality: self.quality.as_ref(),
+            warnings: &self.warnings,
+        }
     }
-    Some(rate)
 }
 
 /// One clip of silhouettes, or of points.
@@ -181,4 +198,16 @@ pub fn matches_name(index: usize, first_frame: usize) -> String {
 /// Name of the artefact with the picture of a frame of a camera.
 pub fn picture_name(index: usize, frame: usize) -> String {
     format!("picture-{index:03}-{frame:08}.png")
+}
+
+/// Frames a second at which all cameras recorded, if a file tells; with a warning where they differ.
+pub fn frame_rate(cameras: &[CameraReport], warnings: &mut Vec<String>) -> Option<f64> {
+    let mut known = cameras.iter().filter_map(|camera| Some((&camera.camera.name, camera.frame_rate?)));
+    let (first, rate) = known.next()?;
+    if let Some((other, found)) = known.find(|(_, found)| (found - rate).abs() > 0.01 * rate) {
+        warnings.push(format!(
+            "camera {other} has {found} frames a second, camera {first} {rate}: all are taken to have {rate}"
+        ));
+    }
+    Some(rate)
 }

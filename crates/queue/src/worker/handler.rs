@@ -72,6 +72,13 @@ impl Outcome {
         self
     }
 
+    /// The same outcome with more files.
+    #[must_use]
+    pub fn artefacts(mut self, artefacts: impl IntoIterator<Item = Artefact>) -> Self {
+        self.artefacts.extend(artefacts);
+        self
+    }
+
     /// The same outcome with these jobs to add to the run.
     #[must_use]
     pub fn children(mut self, children: Vec<ChildJob>) -> Self {

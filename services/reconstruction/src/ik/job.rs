@@ -12,18 +12,18 @@ use jobs::{
     multi_view::{CameraClips, CameraReport, frame_rate},
 };
 use kinematics::ControlPoint;
-use model::Motion;
 use nalgebra::Vector3;
-use queue::{Artefact, Handler, JobContext, JobError, Outcome};
-use service::{compute, objects};
+use queue::{Handler, JobContext, JobError, Outcome};
+use service::compute;
 
 use super::{
     MAX_STEPS,
     evidence::{self, Frames},
-    method,
-    report::{self, Run},
+    export,
+    finished::Finished,
+    method, report,
 };
-use crate::{InputError, Shared, export, plan_job, run_report::RUN};
+use crate::{InputError, Shared, plan_job};
 
 /// Rates that frames are solved at.
 const FRAME_RATES: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
@@ -76,29 +76,29 @@ impl Handler for IkHandler {
             }
             Ok((problem, solved))
         });
-        let (mut problem, solved) = solved.await?;
+        let (problem, solved) = solved.await?;
         context.check()?;
-        problem.warnings.extend(report::doubts(&solved));
+        let finished = Arc::new(compute::run(move || problem.finish(solved)).await?);
+        let written =
+            results::write(&resources.store, &context, export::files(&finished), 0.95..0.99).await?;
+        let job = resources.job_report(&context, finished.solved.len());
+        let run = report::run_json(context.run_id().0, &request, &cameras, &finished, &job)?;
+        let run = results::write_one(&resources.store, &context, run).await?;
+        Ok(Outcome::default().artefacts(written).artefact(run))
+    }
+}
 
-        context.progress(0.95, "writing the motion");
-        let (problem, solved) = (Arc::new(problem), Arc::new(solved));
-        let mut results = self.motion(&context, &problem, &solved).await?;
-        let run = Run {
-            id: context.run_id().0,
-            request: &request,
-            points: problem.points.iter().map(|point| point.name.as_str()).collect(),
-            model: &problem.model,
-            shape: &problem.shape,
-            frame_rate: problem.frames.rate,
-            solved: &solved,
-            cameras: &cameras,
-            warnings: &problem.warnings,
-            job: &resources.job_report(&context, solved.len()),
-        };
-        let content = serde_json::to_vec_pretty(&run.report()).map_err(JobError::retry)?;
-        results
-            .push(objects::write_result(&resources.store, &context, RUN, "application/json", content).await?);
-        Ok(results.into_iter().fold(Outcome::default(), Outcome::artefact))
+impl Problem {
+    /// The poses as motion, and what is doubtful about them.
+    fn finish(self, solved: Vec<Solved>) -> Result<Finished, InputError> {
+        let Self { model, shape, figure, points, frames, measured, mut warnings } = self;
+        let poses: Vec<_> = solved.iter().map(|solved| figure.pose(solved, None)).collect();
+        let motion = model.motion(&shape, &poses, frames.rate)?;
+        let count = |points: &Vec<Vector3<f64>>| points.iter().filter(|p| p.x.is_finite()).count();
+        let measured = measured.iter().map(count).collect();
+        let points = points.into_iter().map(|point| point.name).collect();
+        warnings.extend(report::doubts(&solved));
+        Ok(Finished { model, shape, points, solved, measured, frame_rate: frames.rate, motion, warnings })
     }
 }
 
@@ -176,38 +176,6 @@ impl IkHandler {
             Ok(Problem { shape, figure, points: chosen.points, frames, measured, warnings, model })
         });
         Ok(read.await?)
-    }
-
-    /// Writes poses and joints.
-    async fn motion(
-        &self,
-        context: &JobContext,
-        problem: &Arc<Problem>,
-        solved: &Arc<Vec<Solved>>,
-    ) -> Result<Vec<Artefact>, JobError> {
-        const TEXT: &str = "text/plain; charset=utf-8";
-        const CSV: &str = "text/csv; charset=utf-8";
-        let (problem, solved) = (problem.clone(), solved.clone());
-        let written = compute::run(move || -> Result<_, InputError> {
-            let Problem { model, shape, figure, frames, measured, .. } = &*problem;
-            let poses: Vec<_> = solved.iter().map(|solved| figure.pose(solved, None)).collect();
-            let motion: Motion = model.motion(shape, &poses, frames.rate)?;
-            let count = |points: &Vec<Vector3<f64>>| points.iter().filter(|p| p.x.is_finite()).count();
-            let counts: Vec<_> = measured.iter().map(count).collect();
-            Ok([
-                ("motion.bvh", TEXT, formats::bvh::write(&motion)),
-                ("poses.csv", CSV, formats::motion_csv::write(&motion)),
-                ("joints.csv", CSV, export::positions(&motion)),
-                ("quality.csv", CSV, report::quality_csv(&solved, &counts, frames.rate)),
-            ])
-        });
-        let mut results = Vec::new();
-        for (name, media_type, content) in written.await? {
-            context.check()?;
-            let store = &self.shared.resources.store;
-            results.push(objects::write_result(store, context, name, media_type, content).await?);
-        }
-        Ok(results)
     }
 }
 

@@ -2,16 +2,19 @@
 
 use std::fmt::Write as _;
 
-use body::{BodyModel, Shape};
 use inverse_kinematics::sequence::Solved;
 use jobs::{
     JobReport,
     inverse_kinematics::SolveInverseKinematics,
     multi_view::CameraReport,
-    run_json::{Code, FileReport},
+    run_json::{RUN_JSON, RunReport, Timings},
 };
-use serde_json::{Value, json};
+use queue::JobError;
+use results::{ResultFile, media_type::JSON};
+use serde_json::json;
 use uuid::Uuid;
+
+use super::finished::Finished;
 
 /// Root mean square distance of the measured points beyond which a frame fits badly, metres.
 const BAD_M: f64 = 0.05;
@@ -67,73 +70,52 @@ pub(super) fn doubts(solved: &[Solved]) -> Vec<String> {
     doubts
 }
 
-/// What decided a result and what it took.
-pub(super) struct Run<'a> {
-    pub id: Uuid,
-    pub request: &'a SolveInverseKinematics,
-    pub points: Vec<&'a str>,
-    pub model: &'a BodyModel,
-    pub shape: &'a Shape,
-    pub frame_rate: f64,
-    pub solved: &'a [Solved],
-    pub cameras: &'a [CameraReport],
-    pub warnings: &'a [String],
-    pub job: &'a JobReport,
-}
-
-impl Run<'_> {
-    /// `run.json`.
-    pub fn report(&self) -> Value {
-        let Self { request, solved, cameras, .. } = self;
-        let mean = |value: &dyn Fn(&Solved) -> Option<f64>| {
-            let found: Vec<f64> = solved.iter().filter_map(value).collect();
-            (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)
-        };
-        let residuals = solved.iter().filter_map(|solved| solved.residual_m);
-        let measurements = self.shape.measurements(self.model);
-        let camera = |camera: &CameraReport| {
-            json!({
-                "name": camera.camera.name, "size": camera.camera.size, "end_frame": camera.end_frame,
-                "frame_rate_hz": camera.frame_rate, "quality": camera.quality, "warnings": camera.warnings,
-            })
-        };
-        json!({
-            "run_id": self.id,
-            "kind": "inverse-kinematics",
-            "code": Code::THIS,
-            "session": {
-                "id": request.session_id,
-                "name": request.session_name,
-                "frames": solved.len(),
-                "frame_rate_hz": self.frame_rate,
-                "points": self.points,
-                "files": request.files.iter().map(FileReport::from).collect::<Vec<_>>(),
-            },
-            "body_model": request.body_model,
-            "body": {
-                "alpha": self.shape.alpha,
-                "stature_m": measurements.stature_m,
-                "mass_kg": measurements.mass_kg,
-            },
-            "parameters": request.how,
-            // nothing is drawn at random
-            "seeds": [],
-            "cameras": cameras.iter().map(camera).collect::<Vec<_>>(),
-            "quality": {
-                "mean_residual_m": mean(&|solved| solved.residual_m),
-                "max_residual_m": residuals.reduce(f64::max),
-                "mean_overlap": mean(&|solved| solved.overlap),
-                "frames_without_measurement": solved.iter().filter(|s| s.residual_m.is_none()).count(),
-            },
-            "warnings": self.warnings,
-            "timings": {
-                "plan": request.cameras.as_ref().map(|cameras| &cameras.plan),
-                "cameras": cameras.iter().map(|camera| &camera.job).collect::<Vec<_>>(),
-                "solve": self.job,
-                "frames_per_second": solved.len() as f64 / self.job.seconds.max(1e-9),
-            },
-        })
+/// `run.json`.
+///
+/// # Errors
+/// To be tried again if it is no JSON.
+pub(super) fn run_json(
+    run_id: Uuid,
+    request: &SolveInverseKinematics,
+    cameras: &[CameraReport],
+    finished: &Finished,
+    job: &JobReport,
+) -> Result<ResultFile, JobError> {
+    let Finished { solved, shape, model, .. } = finished;
+    let mean = |value: &dyn Fn(&Solved) -> Option<f64>| {
+        let found: Vec<f64> = solved.iter().filter_map(value).collect();
+        (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)
+    };
+    let residuals = solved.iter().filter_map(|solved| solved.residual_m);
+    let measurements = shape.measurements(model);
+    let own = json!({
+        "body": {
+            "alpha": shape.alpha,
+            "stature_m": measurements.stature_m,
+            "mass_kg": measurements.mass_kg,
+        },
+        "cameras": cameras.iter().map(CameraReport::summary).collect::<Vec<_>>(),
+        "quality": {
+            "mean_residual_m": mean(&|solved| solved.residual_m),
+            "max_residual_m": residuals.reduce(f64::max),
+            "mean_overlap": mean(&|solved| solved.overlap),
+            "frames_without_measurement": solved.iter().filter(|s| s.residual_m.is_none()).count(),
+        },
+    });
+    let mut timings = Timings::default();
+    if let Some(planned) = &request.cameras {
+        timings = timings.one("plan", &planned.plan);
     }
+    let timings =
+        timings.all("cameras", cameras.iter().map(|camera| &camera.job)).one("solve", job).speed([job]);
+    let report = RunReport {
+        run_id,
+        warnings: &finished.warnings,
+        timings,
+        frames: Some((solved.len(), finished.frame_rate)),
+        points: Some(finished.points.iter().map(String::as_str).collect()),
+    };
+    Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(request, own)?))
 }
 
 #[cfg(test)]

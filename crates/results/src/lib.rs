@@ -1,0 +1,15 @@
+//! The files that people get of a run, whatever its kind.
+//!
+//! [`formats`] has the one table of formats that every kind of run writes; a kind adds what is its own as [`ResultFile`]s.
+//! [`write`] writes them one after the other.
+
+mod file;
+pub mod media_type;
+mod positions;
+mod table;
+mod write;
+
+pub use file::ResultFile;
+pub use positions::cell;
+pub use table::{Finished, Kind, formats};
+pub use write::{write, write_one};

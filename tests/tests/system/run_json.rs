@@ -1,0 +1,189 @@
+//! `run.json`: whatever its kind, a run says who made its results from what, and how long it took.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use serde_json::{Map, Value, json};
+use tests::{Api, System, trials};
+
+use crate::{bodies, inverse_kinematics, tracking};
+
+/// A run that has succeeded, and what its `run.json` must have.
+struct Expected {
+    run: String,
+    kind: &'static str,
+    /// what it is on
+    subject: &'static str,
+    /// its input files
+    files: Vec<Value>,
+    /// versions of what was learned before
+    learned_from: &'static [&'static str],
+    stages: &'static [&'static str],
+}
+
+#[test]
+fn every_kind_of_run_says_who_made_its_results_from_what() -> Result<()> {
+    let mut system = System::with_cameras(2)?;
+    system.start_motion_index()?;
+    system.start_reconstruction(2)?;
+    let api = system.project("heads")?;
+    let runs = [
+        build_database(&api)?,
+        train(&api)?,
+        build_body_model(&api)?,
+        sparse(&api)?,
+        multi_view(&api, false, &["plan", "cameras", "initialise"])?,
+        multi_view(&api, true, &["plan", "cameras", "initialise", "chunks", "merge"])?,
+        solve(&api)?,
+    ];
+    let mut heads = Vec::new();
+    for expected in runs {
+        let end = api.wait(&expected.run)?;
+        ensure!(end["state"] == "succeeded", "{}: {end}", expected.kind);
+        let report = api.get(&format!("{}/results/run.json", expected.run))?.json();
+        check(&report, &expected).with_context(|| format!("{}: {report:#}", expected.kind))?;
+        heads.push((expected.kind, head(&report, &expected)?));
+    }
+    for pair in heads.windows(2) {
+        assert_eq!(pair[0].1, pair[1].1, "{} and {} have different heads", pair[0].0, pair[1].0);
+    }
+    Ok(())
+}
+
+/// The keys of the head; what a run is on has one name here, and what was learned before none.
+fn head(report: &Value, expected: &Expected) -> Result<Vec<String>> {
+    let all = report.as_object().context("no object")?;
+    let is_head = |key: &&String| {
+        let words = ["run_id", "kind", "code", "parameters", "seeds", "warnings", "workers", "timings"];
+        words.contains(&key.as_str()) || *key == expected.subject
+    };
+    let named = |key: &String| if key == expected.subject { "subject".to_owned() } else { key.clone() };
+    let mut keys: Vec<String> = all.keys().filter(is_head).map(named).collect();
+    keys.extend(object(&report["code"])?.keys().map(|key| format!("code.{key}")));
+    keys.extend(["id", "name", "files"].map(|key| format!("subject.{key}")));
+    keys.sort();
+    Ok(keys)
+}
+
+fn check(report: &Value, expected: &Expected) -> Result<()> {
+    let id = expected.run.rsplit('/').next().unwrap_or_default();
+    ensure!(report["run_id"] == id && report["kind"] == expected.kind, "run and kind");
+    let code = &report["code"];
+    ensure!(code["version"] == env!("CARGO_PKG_VERSION"), "version of the code");
+    let is_checkout = Path::new(env!("CARGO_MANIFEST_DIR")).join("../.git").exists();
+    match code["commit"].as_str() {
+        Some(commit) => ensure!(!commit.is_empty(), "the commit is empty"),
+        None => ensure!(code["commit"].is_null() && !is_checkout, "no commit, though there is a checkout"),
+    }
+    let subject = object(&report[expected.subject])?;
+    ensure!(
+        subject["id"].as_str().is_some_and(|id| id.len() == 36) && subject["name"].is_string(),
+        "subject"
+    );
+    let files = subject["files"].as_array().context("no files")?;
+    for (found, uploaded) in files.iter().zip(&expected.files) {
+        for key in ["name", "role", "bytes", "blake3"] {
+            ensure!(found[key] == uploaded[key] && !found[key].is_null(), "{key} of {found}");
+        }
+    }
+    ensure!(files.len() == expected.files.len(), "number of input files");
+    for learned in expected.learned_from {
+        let learned = object(&report[learned])?;
+        ensure!(learned["version"].is_i64() && learned["blake3"].as_str().is_some_and(|b| b.len() == 64));
+    }
+    ensure!(!object(&report["parameters"])?.is_empty(), "parameters");
+    ensure!(report["seeds"].is_array() && report["warnings"].is_array(), "seeds and warnings");
+    let workers = report["workers"].as_array().context("no workers")?;
+    ensure!(!workers.is_empty() && workers.iter().all(|w| w.as_str().is_some_and(|w| !w.is_empty())));
+    let timings = object(&report["timings"])?;
+    for stage in expected.stages {
+        let jobs = match timings.get(*stage).context(*stage)? {
+            Value::Array(jobs) => jobs.clone(),
+            job => vec![job.clone()],
+        };
+        ensure!(!jobs.is_empty(), "no job of stage {stage}");
+        for job in jobs {
+            ensure!(workers.contains(&job["worker"]), "the worker of {job} is not named");
+            ensure!(
+                job["attempt"] == 1 && job["seconds"].as_f64() > Some(0.0) && job["frames"].is_u64(),
+                "{job}"
+            );
+        }
+    }
+    Ok(())
+}
+
+fn object(value: &Value) -> Result<&Map<String, Value>> {
+    value.as_object().with_context(|| format!("{value} is no object"))
+}
+
+fn path_of(run: &Value) -> Result<String> {
+    Ok(format!("/v1/runs/{}", run["id"].as_str().context("no id")?))
+}
+
+fn files(api: &Api, owner: &str) -> Result<Vec<Value>> {
+    api.get(&format!("{owner}/files"))?.json().as_array().cloned().context("no files")
+}
+
+fn build_database(api: &Api) -> Result<Expected> {
+    let path = "/v1/motion-databases/walks";
+    api.make("/v1/motion-databases", &json!({ "name": "walks" }))?;
+    api.upload(&format!("{path}/files/1.asf"), trials::skeleton().as_bytes())?;
+    for seed in 1..=4 {
+        api.upload(&format!("{path}/files/1_{seed:02}.amc"), trials::motion(seed, 240).as_bytes())?;
+    }
+    let run = path_of(&api.make(&format!("{path}/build"), &json!({}))?)?;
+    let end = api.wait(&run)?;
+    ensure!(end["state"] == "succeeded", "{end}");
+    let stages = &["plan", "imports", "build"];
+    let (kind, subject, files) = ("motion-database", "motion_database", files(api, path)?);
+    Ok(Expected { run, kind, subject, files, learned_from: &[], stages })
+}
+
+fn train(api: &Api) -> Result<Expected> {
+    let parameters = json!({"latent_dims": 2, "active": 48, "max_iterations": 5});
+    let request = json!({"method": "gplvm", "parameters": parameters});
+    let run = path_of(&api.make("/v1/motion-databases/walks/train", &request)?)?;
+    let (kind, subject, stages) = ("training", "motion_database", &["train"]);
+    // it reads the database itself
+    Ok(Expected { run, kind, subject, files: Vec::new(), learned_from: &["motion_database"], stages })
+}
+
+fn build_body_model(api: &Api) -> Result<Expected> {
+    let (path, run, end) = bodies::build(api, "people", &bodies::scans(8))?;
+    ensure!(end["state"] == "succeeded", "{end}");
+    let (kind, subject, files) = ("body-model", "body_model", files(api, &path)?);
+    Ok(Expected { run, kind, subject, files, learned_from: &[], stages: &["build"] })
+}
+
+fn sparse(api: &Api) -> Result<Expected> {
+    let session = crate::session(api, 21, 240)?;
+    let run = api.start_run(&session, &json!({"motion_database": "walks"}))?;
+    let (files, learned_from) = (files(api, &session)?, &["motion_database"]);
+    let stages = &["plan", "chunks", "merge"];
+    Ok(Expected { run, kind: "reconstruction", subject: "session", files, learned_from, stages })
+}
+
+fn multi_view(api: &Api, track: bool, stages: &'static [&'static str]) -> Result<Expected> {
+    let session = tracking::take(0)?.upload(api)?;
+    let parameters = json!({"track": track, "overlay": false, "frame_rate": 25});
+    let run = api.start_run(&session, &json!({ "parameters": parameters }))?;
+    let files = files(api, &session)?;
+    Ok(Expected { run, kind: "multi-view", subject: "session", files, learned_from: &["body_model"], stages })
+}
+
+fn solve(api: &Api) -> Result<Expected> {
+    let capture = inverse_kinematics::capture(1)?;
+    let session = api.session(
+        "take",
+        &[
+            ("calibration.json", &capture.calibration),
+            ("silhouettes.tar", &capture.masks),
+            ("points.csv", &capture.points),
+        ],
+    )?;
+    let run = api.start_run(&session, &json!({ "kind": "inverse-kinematics" }))?;
+    let (files, learned_from) = (files(api, &session)?, &["body_model"]);
+    let stages = &["plan", "cameras", "solve"];
+    Ok(Expected { run, kind: "inverse-kinematics", subject: "session", files, learned_from, stages })
+}
