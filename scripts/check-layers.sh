@@ -185,6 +185,13 @@ if [[ -n $wrong ]]; then
 fi
 
 domain_crates=$(awk '$2 == "domain" { print $1, $3 }' "$work/layers")
+# What computes is optimised, and cargo warns of a name in [profile] that is no crate, but not of one that is missing.
+while read -r crate _; do
+    if ! grep -qxF "[profile.release.package.$crate]" Cargo.toml; then
+        echo "crate $crate (domain) has no [profile.release.package.$crate] in Cargo.toml: it would not be optimised" >&2
+        failed=1
+    fi
+done <<<"$domain_crates"
 while read -r crate folder; do
     dependencies=$(impure_dependencies "$crate")
     if [[ -n $dependencies ]]; then

@@ -87,6 +87,7 @@ async fn enqueue<J: Job>(
 }
 
 async fn latency(pool: &PgPool) -> Result<(), Box<dyn std::error::Error>> {
+    #[expect(clippy::disallowed_methods, reason = "holds one number a job, of which there is a fixed number")]
     let (starts, mut started) = mpsc::unbounded_channel();
     let shutdown = CancellationToken::new();
     let worker =

@@ -24,6 +24,7 @@ pub fn on_signal() -> std::io::Result<CancellationToken> {
         stop.cancel();
         let name = next().await;
         tracing::warn!(signal = name, "stopping at once");
+        #[expect(clippy::disallowed_methods, reason = "who asks twice does not want to wait for anything")]
         std::process::exit(130);
     });
     Ok(token)
