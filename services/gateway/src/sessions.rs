@@ -1,6 +1,7 @@
 //! Capture sessions in the database, found in the caller's project only: what another project has is not there.
 
 use chrono::{DateTime, Utc};
+use queue::RunId;
 use serde::Serialize;
 use sqlx::PgConnection;
 use store::Key;
@@ -50,6 +51,32 @@ pub(crate) async fn find(db: &mut PgConnection, project_id: Uuid, id: Uuid, lock
     .fetch_optional(db)
     .await?
     .ok_or_else(|| Error::not_found("session", id))
+}
+
+/// The sessions of project `$1` with an id below `$2`, newest first, at most `$3`.
+pub(crate) const SELECT_BY_PROJECT: &str = "SELECT id, name, tags, created_at FROM sessions
+     WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3";
+
+/// Adds a session.
+pub(crate) async fn insert(
+    db: &mut PgConnection,
+    project_id: Uuid,
+    name: &str,
+    tags: &[String],
+) -> Result<Session> {
+    let session = sqlx::query_as(
+        "INSERT INTO sessions (id, project_id, name, tags) VALUES ($1, $2, $3, $4)
+         RETURNING id, name, tags, created_at",
+    );
+    Ok(session.bind(Uuid::now_v7()).bind(project_id).bind(name).bind(tags).fetch_one(db).await?)
+}
+
+/// Deletes a session with its files and its runs, which are given: what they left in the object store is of no use now.
+pub(crate) async fn delete(db: &mut PgConnection, id: Uuid) -> Result<Vec<RunId>> {
+    let runs =
+        sqlx::query_scalar("SELECT id FROM runs WHERE session_id = $1").bind(id).fetch_all(&mut *db).await?;
+    sqlx::query("DELETE FROM sessions WHERE id = $1").bind(id).execute(db).await?;
+    Ok(runs)
 }
 
 /// How many runs of a session are under way.

@@ -1,5 +1,4 @@
 use axum::{Json, http::StatusCode};
-use queue::RunId;
 use serde::Deserialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -53,16 +52,7 @@ pub(super) async fn create(
     if let Some(answer) = request.replay(&mut tx, caller.project_id).await? {
         return Ok(answer);
     }
-    let session: Session = sqlx::query_as(
-        "INSERT INTO sessions (id, project_id, name, tags) VALUES ($1, $2, $3, $4)
-         RETURNING id, name, tags, created_at",
-    )
-    .bind(Uuid::now_v7())
-    .bind(caller.project_id)
-    .bind(&body.name)
-    .bind(&body.tags)
-    .fetch_one(&mut *tx)
-    .await?;
+    let session = sessions::insert(&mut tx, caller.project_id, &body.name, &body.tags).await?;
     let answer = Answer::created(format!("/v1/sessions/{}", session.id), &session)?;
     request.commit(tx, caller.project_id, answer).await
 }
@@ -78,9 +68,7 @@ pub(super) async fn list(
     Reader(Access { app, caller }): Reader,
     Query(page): Query<PageQuery>,
 ) -> Result<Json<Page<Session>>> {
-    let query = "SELECT id, name, tags, created_at FROM sessions
-                 WHERE project_id = $1 AND id < $2 ORDER BY id DESC LIMIT $3";
-    page.select(&app.db, query, caller.project_id).await
+    page.select(&app.db, sessions::SELECT_BY_PROJECT, caller.project_id).await
 }
 
 /// Show a session
@@ -116,11 +104,7 @@ pub(super) async fn delete(
                 "{active} runs of this session are under way; cancel them first"
             )));
         }
-        let runs: Vec<RunId> = sqlx::query_scalar("SELECT id FROM runs WHERE session_id = $1")
-            .bind(id)
-            .fetch_all(&mut *tx)
-            .await?;
-        sqlx::query("DELETE FROM sessions WHERE id = $1").bind(id).execute(&mut *tx).await?;
+        let runs = sessions::delete(&mut tx, id).await?;
         tx.commit().await?;
         // nothing names these objects any more
         app.store.remove_all(&store::key::session_prefix(caller.project_id, id)).await?;
