@@ -1,6 +1,6 @@
 //! Draws the README's picture: a synthetic walk, its six control points, and what is reconstructed from them.
 //!
-//! `cargo run --release -p evaluation --example picture -- docs/picture.svg`
+//! `cargo run --release -p evaluation --example picture -- docs/pictures/points-to-body.svg`
 
 use std::{error::Error, ops::ControlFlow};
 
