@@ -22,7 +22,7 @@ test-compose: setup ## the tests against the compose stack, with a Docker engine
 build: setup ## the program, target/release/marey
 	cargo build --release --locked -p marey
 
-lint: setup ## formatting, clippy with warnings denied, purity of the domain crates
+lint: setup ## formatting, clippy with warnings denied, layers of the crates, references
 	@scripts/lint.sh
 
 bench: setup ## every benchmark

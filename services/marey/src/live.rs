@@ -42,7 +42,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 #[command(after_help = "Examples:
   marey live points.csv --database walks --skeleton skeleton.asf -o poses.csv
   cat points.csv | marey live - --database walks > poses.csv
-  marey live points.csv --database walks --state-file performer.state     # goes on where it ended last time")]
+  marey live points.csv --database walks --state-file performer.state   # goes on from there")]
 pub struct Args {
     /// Measured points: a .csv (time,left_wrist_x,…; seconds and metres, y up), .trc or .c3d file, or '-' for lines of a .csv
     points: PathBuf,

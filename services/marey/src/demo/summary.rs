@@ -258,16 +258,17 @@ mod tests {
     #[test]
     fn the_numbers_said_are_the_numbers_done() {
         let text = summary([4.0, 6.0], [5.0, 5.0]).text(Duration::from_secs(12), Path::new("marey-demo"));
+        // how wide columns are is not the matter
+        let said = text.split_whitespace().collect::<Vec<_>>().join(" ");
         for words in [
             "DONE in 12 s: 2 synthetic trials reconstructed",
             "5 sessions, 9 runs",
             "mean over 2 trials",
             "learned from were 7 other trials",
-            "Marey                 5.00 ± 1.00",
-            "plain baseline        5.00 ± 0.00",
-            "1 of 2",
+            "4 Marey 5.00 ± 1.00 1.00 ± 0.00 1 of 2",
+            "6 plain baseline 5.00 ± 0.00 1.00 ± 0.00 1 of 2",
         ] {
-            assert!(text.contains(words), "{words}: {text}");
+            assert!(said.contains(words), "{words}: {text}");
         }
         // one screen
         assert!(text.lines().count() <= 40 && text.lines().all(|line| line.chars().count() <= 120), "{text}");
