@@ -22,8 +22,8 @@ const NUM_SUBJECTS: u32 = 4;
 /// seeds may go into one folder: seed 1 draws synthetic1 to synthetic4, seed 2 synthetic2 to synthetic5, and so on.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  marey sample --out recordings/ --count 40                     # to learn from: marey db build walks recordings/
-  marey sample --out take/ --count 1 --seed 2 --points 6        # a session to upload: take/synthetic2_01.points.csv
+  marey sample --out recordings/ --count 40                # to learn from
+  marey sample --out take/ --count 1 --seed 2 --points 6   # a session to upload
   marey sample --out walks/ --count 20 --action walk")]
 pub struct Args {
     /// Folder to write to

@@ -38,7 +38,7 @@ const STATURES_M: [f64; 5] = [1.58, 1.66, 1.73, 1.79, 1.86];
 #[command(after_help = "Examples:
   marey sample-capture --out capture/ --frames 24
   marey upload \"synthetic walk\" capture/calibration.json capture/silhouettes/
-  marey run \"synthetic walk\" --set frame_rate=30 --watch      # silhouettes don't say their frame rate")]
+  marey run \"synthetic walk\" --set frame_rate=30 --watch   # silhouettes have no rate")]
 pub struct Args {
     /// Folder to write to
     #[arg(long)]

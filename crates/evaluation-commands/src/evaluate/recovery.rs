@@ -34,7 +34,7 @@ synthetic motion and the prior is the built-in one.
 
 Examples:
   marey evaluate recovery --limbs leg --turned 40 --starts 5
-  marey evaluate recovery --motion recordings/ --limbs arm --turned 60 --starts 5 --json recovery.json")]
+  marey evaluate recovery --motion recordings/ --limbs arm --turned 60 --starts 5")]
 pub struct Args {
     /// Folders of recordings: ASF+AMC of the CMU skeleton, also .zst or .gz [default: synthetic motion]
     #[arg(long, num_args = 1.., value_name = "DIR")]
