@@ -47,7 +47,7 @@ pub enum Error {
         has: String,
     },
     /// A name of a map stands for several of the file.
-    #[error("marker {name} may be any of {found} in the file; say which by a prefix or by the whole name")]
+    #[error("marker {name} may be any of {found} in the file; choose one by a prefix or by its whole name")]
     Unclear {
         /// the marker's name in the map
         name: String,
@@ -56,14 +56,14 @@ pub enum Error {
     },
     /// The file's names belong to no preset.
     #[error(
-        "the file's markers belong to no known marker set ({nearest}); say what they are by a marker map"
+        "the file's markers belong to no known marker set ({nearest}); say what they are in a marker map, --map FILE"
     )]
     Unknown {
         /// what came nearest
         nearest: String,
     },
     /// The file's names belong to several presets, or to several people.
-    #[error("the file's markers may be any of {candidates}; say which")]
+    #[error("the file's markers may be any of {candidates}; choose one")]
     Ambiguous {
         /// presets and prefixes
         candidates: String,

@@ -76,7 +76,7 @@ pub enum ErrorCode {
     Unavailable,
     /// The client went away.
     Cancelled,
-    /// A fault of ours.
+    /// An internal error.
     Internal,
 }
 
@@ -89,7 +89,7 @@ pub trait CallError: std::error::Error {
 /// The answer to a call that failed: the one place where errors become status codes and are logged.
 ///
 /// What is wrong with a request is told to the client alone. What is wrong with the system is logged, with its causes, of
-/// which the message may say less: a fault of ours, of which the client is told nothing more, as an error; that something is
+/// which the message may say less: an internal error, of which the client is told nothing more, as an error; that something is
 /// away or not ready as a warning.
 pub fn status(error: &impl CallError) -> Status {
     let code = error.code();

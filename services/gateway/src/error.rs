@@ -77,7 +77,7 @@ pub enum Error {
     /// PostgreSQL or the object store does not answer.
     #[error("{0} does not answer; try again later")]
     Unavailable(&'static str),
-    /// A fault of ours. The detail is logged and not sent.
+    /// An internal error. The detail is logged and not sent.
     #[error("something went wrong here; it has been logged")]
     Internal(String),
 }
@@ -101,7 +101,7 @@ impl Error {
             Self::MethodNotAllowed(_) => (S::METHOD_NOT_ALLOWED, "method-not-allowed", "Method not allowed"),
             Self::BadRequest(_) => (S::BAD_REQUEST, "bad-request", "The request can't be read"),
             Self::Unprocessable(_) => (S::UNPROCESSABLE_ENTITY, "unprocessable", "The request can't be done"),
-            Self::Conflict(_) => (S::CONFLICT, "conflict", "Not possible in the present state"),
+            Self::Conflict(_) => (S::CONFLICT, "conflict", "Not possible at present"),
             Self::UnsupportedMediaType(_) => {
                 (S::UNSUPPORTED_MEDIA_TYPE, "unsupported-media-type", "Media type not taken here")
             }

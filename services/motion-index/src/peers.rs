@@ -22,7 +22,7 @@ const REST: Duration = Duration::from_secs(5);
 /// An address of a replica that is none.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{found:?} is no address of a motion-index replica, expected one such as http://10.0.0.7:50051: {reason}"
+    "{found:?} is not the address of a motion-index replica, expected one such as http://10.0.0.7:50051: {reason}"
 )]
 pub struct BadPeer {
     /// What was configured.

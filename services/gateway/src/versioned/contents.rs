@@ -143,8 +143,8 @@ pub(crate) async fn gplvm(db: &mut PgConnection, database: &MotionDatabase) -> R
     .await?;
     let (store_key, blake3) = found.ok_or_else(|| {
         Error::Conflict(format!(
-            "no gplvm was trained on motion database {0}; POST /v1/motion-databases/{0}/train first, or \
-             `marey db train {0}`",
+            "no GPLVM has been trained on motion database {0}; train it first: marey db train {0} \
+             (POST /v1/motion-databases/{0}/train)",
             database.version()
         ))
     })?;
