@@ -44,7 +44,7 @@ pub use metrics::{Comparison, Errors, JointErrors, compare, compare_in_detail};
 pub use performer::{
     FeetResult, FootNumbers, SkeletonResult, SkeletonSource, SkeletonTrial, evaluate_feet, evaluate_skeletons,
 };
-pub use picture::Picture;
+pub use picture::{Picture, bones};
 pub use proportion::{PairedDifference, Proportion, Verdict};
 pub use protocol::{ControlSet, Protocol};
 pub use shape::{Body, Distribution, ShapeErrors, shape_errors};

@@ -19,6 +19,8 @@ const PIXELS_PER_METRE: f64 = 150.0;
 const SPREAD_M: f64 = 0.35;
 /// Those who go less far than this are seen along the z axis, metres.
 const STANDING_M: f64 = 0.1;
+/// Places nearer than this are the same, metres.
+const SAME_M: f64 = 1e-6;
 
 /// Measured points (red), the motion found from them (blue) and the true one (grey, behind it).
 #[derive(Debug, Clone, Copy)]
@@ -98,11 +100,27 @@ impl View {
 }
 
 fn root(motion: &Motion, frame: usize) -> Vector3<f64> {
+    bones(motion, frame).first().map_or(Vector3::zeros(), |(from, _)| *from)
+}
+
+/// Both ends of every bone in a frame, in world space, metres; the first begins at the root. Bones lead from joints to their
+/// tips, and to children that sit elsewhere than there, as in BVH files.
+pub fn bones(motion: &Motion, frame: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let skeleton = motion.skeleton();
     let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
     let mut state = kinematics.state();
     kinematics.update(motion.pose(frame), &mut state);
-    state.positions[0]
+    let joints = skeleton.joints();
+    let mut bones = Vec::with_capacity(joints.len());
+    for (j, joint) in joints.iter().enumerate() {
+        if let Some(parent) =
+            joint.parent.filter(|&parent| (joints[parent].tip - joint.offset).norm() > SAME_M)
+        {
+            bones.push((state.positions[parent], state.positions[j]));
+        }
+        bones.push((state.positions[j], state.point(j, &joint.tip)));
+    }
+    bones
 }
 
 fn draw_bones(
@@ -113,12 +131,8 @@ fn draw_bones(
     width: f64,
     project: &dyn Fn(Vector3<f64>) -> (f64, f64),
 ) {
-    let skeleton = motion.skeleton();
-    let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
-    let mut state = kinematics.state();
-    kinematics.update(motion.pose(frame), &mut state);
-    for (j, joint) in skeleton.joints().iter().enumerate() {
-        let ((x1, y1), (x2, y2)) = (project(state.positions[j]), project(state.point(j, &joint.tip)));
+    for (from, to) in bones(motion, frame) {
+        let ((x1, y1), (x2, y2)) = (project(from), project(to));
         let _ = writeln!(
             svg,
             "<path d=\"M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\"/>"
@@ -128,6 +142,9 @@ fn draw_bones(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use model::Skeleton;
     use sample_motion::{Action, DrawOptions, Model};
 
     use super::*;
@@ -153,6 +170,26 @@ mod tests {
             assert!(x.iter().all(|x| (0.0..=1000.0).contains(x)), "{action}: {x:?}");
             assert!(y.iter().all(|y| (0.0..=FLOOR).contains(y)), "{action}: {y:?}");
             assert!(svg.contains(">a &lt; b &amp; c</text>") && svg.ends_with("</svg>\n"));
+        }
+    }
+
+    #[test]
+    fn joints_without_tips_are_joined_to_their_children() {
+        let options = DrawOptions { frames: 8, subject: 1 };
+        let motion = Model::bundled().draw(Action::Walk, 7, &options).unwrap();
+        // as BVH files have them
+        let mut joints = motion.skeleton().joints().to_vec();
+        joints.iter_mut().for_each(|joint| joint.tip = Vector3::zeros());
+        let bare = Arc::new(Skeleton::new("bare", joints).unwrap());
+        let bare = Motion::new(bare, motion.frame_rate(), motion.values().to_vec()).unwrap();
+        let long = |motion: &Motion| -> Vec<(Vector3<f64>, Vector3<f64>)> {
+            bones(motion, 5).into_iter().filter(|(from, to)| (to - from).norm() > 0.01).collect()
+        };
+        let (own, found) = (long(&motion), long(&bare));
+        assert!(found.len() > 15, "{}", found.len());
+        for (from, to) in &found {
+            let is_same = |(a, b): &(Vector3<f64>, Vector3<f64>)| (a - from).norm() + (b - to).norm() < 1e-9;
+            assert!(own.iter().any(is_same), "{from} {to}");
         }
     }
 

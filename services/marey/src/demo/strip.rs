@@ -1,6 +1,6 @@
 //! A motion as a strip of stick figures, drawn in the dots of Braille characters.
 
-use kinematics::{Kinematics, Parametrisation};
+use evaluation::bones;
 use model::Motion;
 use nalgebra::Vector3;
 
@@ -65,17 +65,8 @@ impl Dots {
 
 /// The motion from the side, in seven moments from the first frame to the last, `columns` characters wide and `lines` high.
 pub fn strip(motion: &Motion, columns: usize, lines: usize) -> String {
-    let skeleton = motion.skeleton();
-    let kinematics = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
     let last = motion.num_frames().saturating_sub(1);
-    // both ends of every bone, metres
-    let figure = |frame: usize| -> Vec<(Vector3<f64>, Vector3<f64>)> {
-        let mut state = kinematics.state();
-        kinematics.update(motion.pose(frame), &mut state);
-        let joints = skeleton.joints().iter().enumerate();
-        joints.map(|(j, joint)| (state.positions[j], state.point(j, &joint.tip))).collect()
-    };
-    let figures: Vec<_> = (0..FIGURES).map(|i| figure(i * last / (FIGURES - 1))).collect();
+    let figures: Vec<_> = (0..FIGURES).map(|i| bones(motion, i * last / (FIGURES - 1))).collect();
     let root =
         |figure: &[(Vector3<f64>, Vector3<f64>)]| figure.first().map_or(Vector3::zeros(), |bone| bone.0);
     let mut way = root(&figures[FIGURES - 1]) - root(&figures[0]);

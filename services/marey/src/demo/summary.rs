@@ -108,7 +108,7 @@ impl Summary {
         let _ = writeln!(
             out,
             "  {:<8}{:<16}{:>18}{:>22}{:>15}",
-            "points", "method", "joint angles, °", "joint positions, cm", "nearer truth"
+            "points", "method", "joint angles, °", "joint positions, cm", "better in"
         );
         for points in POINT_SETS {
             for method in METHODS {
@@ -119,7 +119,8 @@ impl Summary {
         let _ = write!(
             out,
             "  The baseline searches and fits as Marey does, but predicts that the motion goes on as the one most similar\n  \
-             recording did (--method nearest). The trials were held out: learned from were {learned} of the same people.\n"
+             recording did (--method nearest); better: smaller error in angles. The trials were held out: Marey learned\n  \
+             from {learned} of the same people.\n"
         );
         if self.is_synthetic {
             out.push_str("  All of it is drawn from a statistical model; recorded motion is harder: see docs/accuracy.md.\n");
@@ -264,7 +265,7 @@ mod tests {
             "DONE in 12 s: 2 synthetic trials reconstructed",
             "5 sessions, 9 runs",
             "mean over 2 trials",
-            "learned from were 7 other trials",
+            "Marey learned from 7 other trials of the same people",
             "4 Marey 5.00 ± 1.00 1.00 ± 0.00 1 of 2",
             "6 plain baseline 5.00 ± 0.00 1.00 ± 0.00 1 of 2",
         ] {

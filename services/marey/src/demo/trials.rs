@@ -148,8 +148,7 @@ fn wait(client: &Client, started: &[Started]) -> anyhow::Result<Vec<TrialErrors>
             client.get(&format!("/v1/runs/{run}/results/evaluation.json"))?;
         let trial = take.name.clone();
         errors.push(TrialErrors { trial, num_points: *num_points, method, rms_deg, mpjpe_cm });
-        let done = index + 1;
-        display.show(done as f64 / started.len() as f64, &format!("{done} of {} runs", started.len()));
+        display.show((index + 1) as f64 / started.len() as f64, "running");
     }
     display.close();
     Ok(errors)
