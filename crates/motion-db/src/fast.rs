@@ -37,7 +37,7 @@ const LOST_PART: usize = 2;
 
 /// How a fast search went.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum SearchMode {
     /// along the graph from the hints
     Tracked,
     /// by the lists alone: there were no hints, or the graph had lost the way
@@ -176,10 +176,10 @@ impl WindowIndex {
         k: usize,
         scratch: &mut Scratch,
         out: &mut Vec<Neighbour>,
-    ) -> Way {
+    ) -> SearchMode {
         let Some(segments) = self.segments.as_ref().filter(|s| 4 * k <= s.len()) else {
             self.nearest(query, k, scratch, out);
-            return Way::Exact;
+            return SearchMode::Exact;
         };
         Arch::new().dispatch(FastSearch { index: self, segments, query, k, scratch, out })
     }
@@ -196,10 +196,10 @@ struct FastSearch<'a, 'q> {
 }
 
 impl WithSimd for FastSearch<'_, '_> {
-    type Output = Way;
+    type Output = SearchMode;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Way {
+    fn with_simd<S: Simd>(self, _: S) -> SearchMode {
         let Self { index, segments, query, k, scratch, out } = self;
         let lead = segments.quantise(query.features, &mut scratch.fast.tail);
         let energy: f32 = query.features.iter().skip(lead.len()).map(|v| v * v).sum();
@@ -216,13 +216,13 @@ impl WithSimd for FastSearch<'_, '_> {
             let is_on_the_way =
                 |n: &&Neighbour| segments.segment_at(n.row).is_some_and(|s| scratch.fast.seen[s] == age);
             if LOST_PART * out.iter().filter(is_on_the_way).count() >= k {
-                return Way::Tracked;
+                return SearchMode::Tracked;
             }
         }
         scratch.fast.start(segments.len());
         ask.add_nearest_lists(global.lists, &mut scratch.fast);
         index.look_into(&ask, k, global.segments, scratch, out);
-        Way::Global
+        SearchMode::Global
     }
 }
 

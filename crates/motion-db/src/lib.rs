@@ -40,7 +40,7 @@ pub use build::{Clip, SkeletonSize, resample};
 pub use controls::ControlTable;
 pub use database::{ClipInfo, FRAME_RATE, MotionDatabase};
 pub use error::Error;
-pub use fast::Way;
+pub use fast::SearchMode;
 pub use file::{FORMAT_VERSION, IndexFile, write_index};
 pub use frame::HeadingFrame;
 pub use mirror::mirror;

@@ -7,7 +7,8 @@ use std::collections::HashSet;
 use fixtures::{Numbers, Question, SIX, drawn, drawn_clips, questions, recorded};
 use kinematics::{PointSet, control_points};
 use motion_db::{
-    Augment, Clip, ControlTable, MotionDatabase, Neighbour, Query, Scratch, Way, WindowIndex, trial_name,
+    Augment, Clip, ControlTable, MotionDatabase, Neighbour, Query, Scratch, SearchMode, WindowIndex,
+    trial_name,
 };
 use sample_motion::Action;
 
@@ -74,7 +75,7 @@ fn of_the_windows_nearest_to_other_performers_99_of_100_are_found() {
                     let count = &mut counts[2 * with_controls + tracking];
                     count[0] += hits(found, &exact);
                     count[1] += K;
-                    count[2] += usize::from(tracking == 1 && way == Way::Tracked);
+                    count[2] += usize::from(tracking == 1 && way == SearchMode::Tracked);
                     // What is found is found at its distance, to the last bit.
                     for n in found {
                         let same = exact.iter().find(|e| e.row == n.row);
@@ -108,18 +109,21 @@ fn a_graph_that_has_lost_the_way_is_noticed() {
     let mut last = Vec::new();
     let mut tracked = 0;
     for question in &asked {
-        assert_eq!(index.nearest_fast(&query(question, &[]), K, &mut scratch, &mut global), Way::Global);
+        assert_eq!(
+            index.nearest_fast(&query(question, &[]), K, &mut scratch, &mut global),
+            SearchMode::Global
+        );
         // Somewhere else in the database: the windows of a boxing trial, or a place that the track was left for long ago.
         let boxing: Vec<usize> = (0..K).map(|_| index.clip_rows(3).start + numbers.below(400)).collect();
         let mut wrong = boxing.clone();
         wrong.sort_unstable();
         let way = index.nearest_fast(&query(question, &wrong), K, &mut scratch, &mut found);
-        assert_eq!(way, Way::Global);
+        assert_eq!(way, SearchMode::Global);
         assert_eq!(found, global, "as if there had been no hints");
         // The successors of the last matches lead on.
         if !last.is_empty() {
             let way = index.nearest_fast(&query(question, &last), K, &mut scratch, &mut found);
-            tracked += usize::from(way == Way::Tracked);
+            tracked += usize::from(way == SearchMode::Tracked);
         }
         last = successors(&global);
     }
@@ -184,7 +188,7 @@ fn small_databases_and_large_numbers_are_searched_exactly() {
     for (index, k) in [(&small, K), (&index, 2_000)] {
         let features = index.features(7).to_vec();
         let ask = Query { features: &features, controls: None, exclude: &[], hints: &[] };
-        assert_eq!(index.nearest_fast(&ask, k, &mut scratch, &mut found), Way::Exact);
+        assert_eq!(index.nearest_fast(&ask, k, &mut scratch, &mut found), SearchMode::Exact);
         index.nearest(&ask, k, &mut scratch, &mut exact);
         assert_eq!(found, exact);
     }

@@ -3,7 +3,7 @@
 //!
 //! A start is a body of its own shape in a true pose, seen by cameras, and that pose with limbs turned in every
 //! angle. All methods get the same starts. Local optimisation and searches are judged alone, as in the paper: one
-//! search over the DOFs of the turned limbs, nothing tried twice. [`Way::Marey`] is all that [`Tracker`] does in a
+//! search over the DOFs of the turned limbs, nothing tried twice. [`Strategy::Marey`] is all that [`Tracker`] does in a
 //! frame.
 
 mod start;
@@ -73,7 +73,7 @@ pub struct Setting<'a> {
 
 /// What is done to a start.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Way {
+pub enum Strategy {
     /// local optimisation
     Local,
     /// one search over the DOFs of the turned limbs, and local optimisation after it
@@ -88,7 +88,7 @@ pub struct Method<'a> {
     /// what it is called in tables
     pub name: &'static str,
     /// what it does
-    pub way: Way,
+    pub strategy: Strategy,
     /// of the prior, shape `[poses][dofs]`
     pub training_poses: &'a [Vec<f64>],
 }
@@ -108,10 +108,10 @@ impl<'a> Method<'a> {
             with_prior,
             ..ParticleOptions::default()
         };
-        let search = |name, options| Self { name, way: Way::Search(options), training_poses };
+        let search = |name, options| Self { name, strategy: Strategy::Search(options), training_poses };
         let with = options(25, 10, true);
         let mut methods = vec![
-            Self { name: "local only", way: Way::Local, training_poses },
+            Self { name: "local only", strategy: Strategy::Local, training_poses },
             search(WITH_PRIOR, with),
             search("25 x 10, no prior", options(25, 10, false)),
             search(LARGE_WITHOUT, options(100, 15, false)),
@@ -119,18 +119,18 @@ impl<'a> Method<'a> {
             search("25 x 10 filter, prior", ParticleOptions { annealing: Annealing::Filter, ..with }),
         ];
         if let Some(poses) = built_in {
-            let way = Way::Search(with);
-            methods.push(Self { name: "25 x 10, built-in poses", way, training_poses: poses });
+            let strategy = Strategy::Search(with);
+            methods.push(Self { name: "25 x 10, built-in poses", strategy, training_poses: poses });
         }
-        methods.push(Self { name: "all of Marey", way: Way::Marey(with), training_poses });
+        methods.push(Self { name: "all of Marey", strategy: Strategy::Marey(with), training_poses });
         methods
     }
 
     /// Energies that one search evaluates; 0 without a search.
     pub fn evaluations(&self) -> usize {
-        match self.way {
-            Way::Local => 0,
-            Way::Search(options) | Way::Marey(options) => options.particles * options.iterations,
+        match self.strategy {
+            Strategy::Local => 0,
+            Strategy::Search(options) | Strategy::Marey(options) => options.particles * options.iterations,
         }
     }
 }
@@ -177,16 +177,18 @@ pub fn recover(
 }
 
 fn run(setting: &Setting<'_>, start: &Start, method: &Method<'_>) -> Result<Recovered> {
-    let particles = match method.way {
-        Way::Local => None,
-        Way::Search(options) | Way::Marey(options) => Some(ParticleOptions { seed: setting.seed, ..options }),
+    let particles = match method.strategy {
+        Strategy::Local => None,
+        Strategy::Search(options) | Strategy::Marey(options) => {
+            Some(ParticleOptions { seed: setting.seed, ..options })
+        }
     };
     let options = Options { particles, ..Options::default() };
     let training_poses = method.training_poses.to_vec();
     let mut tracker =
         Tracker::with_training_poses(setting.model, &start.alpha, &start.disturbed, options, training_poses)?;
     let frame = &start.frame;
-    if matches!(method.way, Way::Marey(_)) {
+    if matches!(method.strategy, Strategy::Marey(_)) {
         let tracked = tracker.track(frame, &AtomicBool::new(false))?;
         let final_m = farthest(&tracked.joints, &start.joints);
         return Ok(Recovered { searched_m: final_m, final_m });

@@ -1,6 +1,6 @@
 use std::time::Instant;
 
-use motion_db::{Neighbour, Query, Scratch, Way, WindowIndex};
+use motion_db::{Neighbour, Query, Scratch, SearchMode, WindowIndex};
 use serde::Serialize;
 
 use super::questions::Run;
@@ -53,7 +53,7 @@ pub fn measure(index: &WindowIndex, runs: &[Run], k: usize, search: Search, trut
             let way = match search {
                 Search::ExactCold | Search::ExactTracking => {
                     index.nearest(&query, k, &mut scratch, &mut found);
-                    Way::Exact
+                    SearchMode::Exact
                 }
                 Search::FastCold | Search::FastTracking => {
                     index.nearest_fast(&query, k, &mut scratch, &mut found)
@@ -67,7 +67,7 @@ pub fn measure(index: &WindowIndex, runs: &[Run], k: usize, search: Search, trut
             }
             if !tracks || q > 0 {
                 times.push(seconds);
-                tracked += usize::from(way == Way::Tracked);
+                tracked += usize::from(way == SearchMode::Tracked);
                 run_queries += 1;
                 let expected = if is_first { &of_run[q] } else { &truth[r][q] };
                 run_hits += found.iter().filter(|n| expected.binary_search(&n.row).is_ok()).count();

@@ -1,6 +1,6 @@
 //! Success rates as a table, and the paper's claim.
 
-use evaluation::recovery::{FOUND_M, LARGE_WITHOUT, Method, Recovered, WITH_PRIOR, Way};
+use evaluation::recovery::{FOUND_M, LARGE_WITHOUT, Method, Recovered, Strategy, WITH_PRIOR};
 use evaluation::{
     PairedDifference, Proportion, Verdict,
     tables::{Cell as Value, Table},
@@ -89,7 +89,7 @@ impl Cell {
         let cell = |method: &Method<'_>, recovered: &Vec<Recovered>| MethodCell {
             name: method.name,
             evaluations: method.evaluations(),
-            search: matches!(method.way, Way::Search(_))
+            search: matches!(method.strategy, Strategy::Search(_))
                 .then(|| Proportion::from_tries(recovered.iter().map(Recovered::is_found_by_search))),
             found: Proportion::from_tries(recovered.iter().map(Recovered::is_found)),
             searched_m: recovered.iter().map(|start| start.searched_m).collect(),
