@@ -127,6 +127,7 @@ impl System {
         let mut config =
             service::Config::new(self.database.url(), Location::folder(self.store.path()), any_port());
         config.worker.concurrency = workers;
+        config.code = marey::CODE;
         config
     }
 

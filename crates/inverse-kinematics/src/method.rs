@@ -1,7 +1,10 @@
+use serde::{Deserialize, Serialize};
+
 use crate::Options;
 
 /// The methods that runs and calls choose from, by name.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// end effectors alone: what is free stays as it was
     Plain,

@@ -11,8 +11,10 @@ pub mod motion_database;
 pub mod multi_view;
 mod report;
 pub mod run_json;
+mod session;
 pub mod sparse;
 mod versions;
 
 pub use artefacts::{InputFile, Object, file_part, named};
 pub use report::JobReport;
+pub use session::{PointChoice, SessionInputs};

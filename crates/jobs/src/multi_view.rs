@@ -5,12 +5,10 @@ mod tracking;
 
 use std::collections::BTreeMap;
 
-use model::Axis;
 use multi_view::Parameters;
 use queue::Job;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use uuid::Uuid;
 
 pub use silhouettes::{
     CameraClips, CameraReport, CameraSummary, ClipPlace, MakeSilhouettes, Members, Source, SourceKind,
@@ -19,10 +17,10 @@ pub use silhouettes::{
 pub use tracking::{DrawOverlay, FitShape, MergeTracks, TRACKED, TrackChunk, TrackingSession};
 
 use crate::{
-    InputFile,
+    SessionInputs,
     body_model::BodyModelFile,
     inverse_kinematics::InverseKinematics,
-    run_json::{FileReport, LearnedFrom, Request, SessionReport, Subject},
+    run_json::{LearnedFrom, Request, Subject},
 };
 
 /// The kind of such runs.
@@ -32,23 +30,17 @@ pub const RUN_KIND: &str = "multi-view";
 /// service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanMultiView {
-    /// The session.
-    pub session_id: Uuid,
-    /// Its name.
-    pub session_name: String,
+    /// The session; `up` is of the calibration's world.
+    #[serde(flatten)]
+    pub inputs: SessionInputs,
     /// The bodies that people may have.
     pub body_model: BodyModelFile,
-    /// The session's files, in order of name.
-    pub files: Vec<InputFile>,
     /// Cameras to use, by name; empty: all that the session has pictures of.
     #[serde(default)]
     pub cameras: Vec<String>,
     /// File, or `ARCHIVE/FOLDER`, → name of its camera, where names don't tell.
     #[serde(default)]
     pub camera_files: BTreeMap<String, String>,
-    /// Axis of the calibration's world that points up, where the file doesn't say it.
-    #[serde(default)]
-    pub up: Option<Axis>,
     /// Metres of one unit of the calibration, where the file doesn't say it.
     #[serde(default)]
     pub metres_per_unit: Option<f64>,
@@ -69,12 +61,7 @@ impl Request for PlanMultiView {
     }
 
     fn subject(&self) -> Subject<'_> {
-        Subject::Session(SessionReport {
-            id: self.session_id,
-            name: &self.session_name,
-            files: FileReport::all(&self.files),
-            ..SessionReport::default()
-        })
+        self.inputs.subject(None)
     }
 
     fn learned_from(&self) -> LearnedFrom<'_> {

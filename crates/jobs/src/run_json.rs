@@ -141,16 +141,26 @@ pub struct Code {
 }
 
 impl Code {
-    /// This program.
-    pub const THIS: Self =
-        Self { version: env!("CARGO_PKG_VERSION"), commit: option_env!("MAREY_BUILT_COMMIT") };
+    /// This version, built from that commit.
+    pub const fn from_commit(commit: Option<&'static str>) -> Self {
+        Self { version: env!("CARGO_PKG_VERSION"), commit }
+    }
+}
+
+/// Where a report comes from: the run, and the program that made its results.
+#[derive(Debug, Clone, Copy)]
+pub struct Origin {
+    /// the run
+    pub run_id: Uuid,
+    /// the program
+    pub code: Code,
 }
 
 /// A run whose results are made.
 #[derive(Debug, Clone)]
 pub struct RunReport<'a> {
-    /// the run
-    pub run_id: Uuid,
+    /// the run, and the program
+    pub origin: Origin,
     /// what was doubtful
     pub warnings: &'a [String],
     /// who did what, and how long it took
@@ -191,9 +201,9 @@ impl RunReport<'_> {
             session.points = self.points.clone();
         }
         let document = Document {
-            run_id: self.run_id,
+            run_id: self.origin.run_id,
             kind: request.run_kind(),
-            code: Code::THIS,
+            code: self.origin.code,
             subject,
             learned_from: request.learned_from(),
             parameters: request.parameters().map_err(JobError::retry)?,

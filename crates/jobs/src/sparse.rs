@@ -1,20 +1,16 @@
 //! Runs from control points and a motion database: plan, chunks, merge.
 
-use std::collections::BTreeMap;
-
 use formats::{BvhOptions, PointsOptions, session};
-use model::Axis;
 use queue::Job;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use skeleton_fit::{LimbScale, Sizes};
 use sparse::Parameters;
-use uuid::Uuid;
 
 use crate::{
-    InputFile, JobReport, Object,
+    JobReport, Object, PointChoice, SessionInputs,
     motion_database::MotionDatabaseFile,
-    run_json::{FileReport, LearnedFrom, Request, SessionReport, Subject},
+    run_json::{LearnedFrom, Request, Subject},
 };
 
 /// The kind of such runs.
@@ -24,33 +20,13 @@ pub const RUN_KIND: &str = "reconstruction";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanSparse {
     /// The session.
-    pub session_id: Uuid,
-    /// Its name.
-    #[serde(default)]
-    pub session_name: String,
+    #[serde(flatten)]
+    pub inputs: SessionInputs,
     /// The database that serves as prior.
     pub motion_database: MotionDatabaseFile,
-    /// The session's files, in order of name.
-    pub files: Vec<InputFile>,
-    /// Control points to use; empty: those of `mapping`, or else all that the file has.
-    #[serde(default)]
-    pub points: Vec<String>,
-    /// Name in the file → name of a control point or joint.
-    #[serde(default)]
-    pub mapping: BTreeMap<String, String>,
-    /// The marker set whose names the file has: `auto` (or nothing) to find out, `none` for control points under their
-    /// own names, or a preset's name.
-    #[serde(default)]
-    pub marker_set: Option<String>,
-    /// Text of a marker map, TOML.
-    #[serde(default)]
-    pub marker_map: Option<String>,
-    /// What the names of the performer's markers begin with.
-    #[serde(default)]
-    pub marker_prefix: Option<String>,
-    /// Axis of TRC and C3D files that points up, where the file does not say it or says it wrong.
-    #[serde(default)]
-    pub up: Option<Axis>,
+    /// Which control points.
+    #[serde(flatten)]
+    pub choice: PointChoice,
     /// Metres of one unit of BVH files.
     #[serde(default = "centimetres")]
     pub bvh_metres_per_unit: f64,
@@ -70,7 +46,7 @@ impl PlanSparse {
     /// How the session's files are to be read.
     pub fn reading(&self) -> session::Options {
         session::Options {
-            points: PointsOptions { up: self.up, sigma_m: self.parameters.control_sigma_m },
+            points: PointsOptions { up: self.inputs.up, sigma_m: self.parameters.control_sigma_m },
             bvh: BvhOptions { metres_per_unit: self.bvh_metres_per_unit },
         }
     }
@@ -82,13 +58,7 @@ impl Request for PlanSparse {
     }
 
     fn subject(&self) -> Subject<'_> {
-        Subject::Session(SessionReport {
-            id: self.session_id,
-            name: &self.session_name,
-            files: FileReport::all(&self.files),
-            mapping: Some(&self.mapping),
-            ..SessionReport::default()
-        })
+        self.inputs.subject(Some(&self.choice))
     }
 
     fn learned_from(&self) -> LearnedFrom<'_> {

@@ -1,6 +1,7 @@
-//! The library of what was learned: motion databases out of the object store, checked, mapped or read, whole or in shards; and
-//! the [`Cache`] in which services keep what they opened.
+//! The library of what was learned: body models out of the object store; motion databases, checked, mapped or read, whole or in
+//! shards; and the [`Cache`] in which services keep what they opened.
 
+pub mod body_model;
 mod cache;
 pub mod motion_database;
 mod threads;

@@ -18,6 +18,7 @@
 //! | `MAREY_LOG_FORMAT` | `pretty` | `pretty` or `json` |
 
 use crate::{Error, log_format::LogFormat};
+use jobs::run_json::Code;
 use std::{net::SocketAddr, time::Duration};
 use store::Location;
 
@@ -36,6 +37,8 @@ pub struct Config {
     pub worker: WorkerConfig,
     /// Bounds on memory.
     pub memory: MemoryConfig,
+    /// This program, as `run.json` names it.
+    pub code: Code,
 }
 
 /// How to reach PostgreSQL.
@@ -98,7 +101,7 @@ pub struct MemoryConfig {
 const GIB: u64 = 1 << 30;
 
 impl Config {
-    /// The defaults, for a database, a store and an address.
+    /// The defaults of a program that doesn't know its commit, for a database, a store and an address.
     pub fn new(database_url: impl Into<String>, store: Location, listen: SocketAddr) -> Self {
         let grace = Duration::from_secs(20);
         Self {
@@ -121,18 +124,23 @@ impl Config {
                 max_build_bytes: 2 * GIB,
                 max_session_frames: 2 * 60 * 60 * 60,
             },
+            code: Code::from_commit(None),
         }
     }
 
-    /// Reads the configuration from variables; `default_listen` is the service's own port.
+    /// Reads the configuration of a service of this program from variables; `default_listen` is the service's own port.
     ///
     /// # Errors
     /// [`Error::NotSet`] or [`Error::BadValue`], naming the variable.
-    pub fn from_variables(vars: &Variables<'_>, default_listen: SocketAddr) -> Result<Self, Error> {
+    pub fn from_variables(
+        vars: &Variables<'_>,
+        default_listen: SocketAddr,
+        code: Code,
+    ) -> Result<Self, Error> {
         let url = vars.required("MAREY_DATABASE_URL", "a PostgreSQL URL")?;
         let store = vars.required("MAREY_STORE", "a folder or URL for objects")?;
         let store = vars.parse("MAREY_STORE", &store)?;
-        let mut config = Self::new(url, store, default_listen);
+        let mut config = Self { code, ..Self::new(url, store, default_listen) };
         vars.set("MAREY_DATABASE_CONNECTIONS", &mut config.database.max_connections)?;
         vars.set("MAREY_LISTEN", &mut config.grpc.listen)?;
         vars.set("MAREY_WORKER_CONCURRENCY", &mut config.worker.concurrency)?;
@@ -177,7 +185,11 @@ mod tests {
 
     fn read(pairs: &[(&str, &str)]) -> Result<Config, Error> {
         let get = |name: &str| pairs.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_owned());
-        Config::from_variables(&Variables::new(&get), SocketAddr::from(([127, 0, 0, 1], 50051)))
+        Config::from_variables(
+            &Variables::new(&get),
+            SocketAddr::from(([127, 0, 0, 1], 50051)),
+            Code::from_commit(None),
+        )
     }
 
     #[test]

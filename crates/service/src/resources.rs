@@ -1,6 +1,9 @@
 use bytes::Bytes;
 use futures::future::BoxFuture;
-use jobs::{InputFile, JobReport};
+use jobs::{
+    InputFile, JobReport,
+    run_json::{Code, Origin},
+};
 use queue::{Artefact, JobContext, JobError};
 use sqlx::PgPool;
 use store::Store;
@@ -23,6 +26,7 @@ pub struct Resources {
     pub memory: MemoryConfig,
     /// How this process shows in `run.json`.
     pub worker_name: String,
+    code: Code,
 }
 
 impl Resources {
@@ -36,6 +40,7 @@ impl Resources {
             store: Store::open(&config.store)?,
             memory: config.memory.clone(),
             worker_name: config.worker.name(service),
+            code: config.code,
         })
     }
 
@@ -54,6 +59,11 @@ impl Resources {
                 .grace(config.shutdown_grace)
                 .before_attempt(clean_up)
         })
+    }
+
+    /// What a `run.json` that this job writes comes from.
+    pub fn origin(&self, context: &JobContext) -> Origin {
+        Origin { run_id: context.run_id().0, code: self.code }
     }
 
     /// What a job has taken so far.

@@ -32,4 +32,5 @@ pub use config::Config;
 pub use error::Error;
 pub use live::Replicas;
 pub use routes::{openapi_document, router};
+pub use runs::session_run_kinds;
 pub use server::{Gateway, run};

@@ -29,6 +29,10 @@ mod words;
 use std::process::ExitCode;
 
 use clap::Parser;
+use jobs::run_json::Code;
+
+/// This program: its version, and the commit that it was built from, where the build knew it.
+pub const CODE: Code = Code::from_commit(option_env!("MAREY_BUILT_COMMIT"));
 
 /// Runs the command given on the command line.
 pub fn main() -> ExitCode {

@@ -1,6 +1,7 @@
 //! `marey run`.
 
 use anyhow::Context;
+use clap::builder::PossibleValuesParser;
 use client::{
     Client, Run, ServerArgs,
     parameters::{pairs, values},
@@ -32,7 +33,7 @@ pub struct Args {
     session: String,
     /// sparse (control points and a motion database), multi-view (cameras) or inverse-kinematics [default: told by the
     /// session's files; required if it has both control points and cameras]
-    #[arg(long, value_parser = ["sparse", "multi-view", "inverse-kinematics"])]
+    #[arg(long, value_parser = PossibleValuesParser::new(gateway::session_run_kinds()))]
     kind: Option<String>,
     /// Any other parameter of the method; may be given several times
     #[arg(long = "set", value_name = "NAME=VALUE")]

@@ -3,6 +3,8 @@
 use anyhow::Context;
 use service::config::{TelemetryConfig, Variables, environment};
 
+use crate::CODE;
+
 /// `marey serve …`
 #[derive(Debug, clap::Subcommand)]
 pub enum Service {
@@ -45,19 +47,19 @@ pub fn run(which: &Service) -> anyhow::Result<()> {
                 gateway::run(config, shutdown).await
             }
             Service::MotionIndex => {
-                let config = motion_index::Config::from_variables(&variables)?;
+                let config = motion_index::Config::from_variables(&variables, CODE)?;
                 Ok(motion_index::run(config, shutdown).await?)
             }
             Service::Reconstruction => {
-                let config = reconstruction::Config::from_variables(&variables)?;
+                let config = reconstruction::Config::from_variables(&variables, CODE)?;
                 Ok(reconstruction::run(config, shutdown).await?)
             }
             Service::ShapeInit => {
-                let config = service::Config::from_variables(&variables, shape_init::DEFAULT_LISTEN)?;
+                let config = service::Config::from_variables(&variables, shape_init::DEFAULT_LISTEN, CODE)?;
                 Ok(shape_init::run(config, shutdown).await?)
             }
             Service::Refinement => {
-                let config = service::Config::from_variables(&variables, refinement::DEFAULT_LISTEN)?;
+                let config = service::Config::from_variables(&variables, refinement::DEFAULT_LISTEN, CODE)?;
                 Ok(refinement::run(config, shutdown).await?)
             }
         }

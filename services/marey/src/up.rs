@@ -18,7 +18,7 @@ use sqlx::{Connection, PgConnection};
 use store::Location;
 use tokio_util::sync::CancellationToken;
 
-use crate::serve::runtime;
+use crate::{CODE, serve::runtime};
 
 /// Running jobs get so long to end after Ctrl-C, before they are handed back to be done again.
 const GRACE: Duration = Duration::from_secs(5);
@@ -163,6 +163,7 @@ async fn start_services(
 
     let any_port = SocketAddr::from(([127, 0, 0, 1], 0));
     let mut config = service::Config::new(&database_url, store, any_port);
+    config.code = CODE;
     config.grpc.shutdown_grace = GRACE;
     config.worker.shutdown_grace = GRACE;
     config.worker.concurrency = args.workers.unwrap_or(config.worker.concurrency);

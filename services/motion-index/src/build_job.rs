@@ -8,7 +8,7 @@ use crate::{
 };
 use jobs::{
     motion_database::{BuildMotionDatabase, PlanMotionDatabase},
-    run_json::{RUN_JSON, RunReport, Timings},
+    run_json::{Origin, RUN_JSON, RunReport, Timings},
 };
 use library::{
     AllCores,
@@ -66,7 +66,7 @@ impl Handler for BuildHandler {
         let timings = Timings::default().one("plan", &plan).all("imports", &imports).one("build", &build);
         let files = vec![
             ResultFile::json(SUMMARY, &Summary::from(&ready))?,
-            run_json(context.run_id().0, &request, &ready, timings)?,
+            run_json(self.resources.origin(&context), &request, &ready, timings)?,
         ];
         let files = results::write(store, &context, files, 0.98..1.0).await?;
         Ok(Outcome::default().artefacts(files).on_complete(move |connection| {
@@ -78,13 +78,13 @@ impl Handler for BuildHandler {
 
 /// `run.json`.
 fn run_json(
-    run_id: Uuid,
+    origin: Origin,
     request: &PlanMotionDatabase,
     ready: &Ready,
     timings: Timings<'_>,
 ) -> Result<ResultFile, JobError> {
     let warnings = &ready.contents.warnings;
-    let report = RunReport { run_id, warnings, timings, frames: None, points: None };
+    let report = RunReport { origin, warnings, timings, frames: None, points: None };
     let built = json!({
         "num_poses": ready.num_poses,
         "num_clips": ready.clips.len(),

@@ -5,6 +5,7 @@
 //! | `MAREY_MOTION_INDEX_PEERS` | none | addresses of all motion-index replicas, `http://a:50051,http://b:50051` |
 //! | `MAREY_MOTION_INDEX_SELF` | none | which of them this one is |
 
+use jobs::run_json::Code;
 use service::config::Variables;
 
 /// Everything that motion-index needs to know.
@@ -31,8 +32,8 @@ impl Config {
     ///
     /// # Errors
     /// As [`service::Config::from_variables`].
-    pub fn from_variables(variables: &Variables<'_>) -> Result<Self, service::Error> {
-        let service = service::Config::from_variables(variables, crate::DEFAULT_LISTEN)?;
+    pub fn from_variables(variables: &Variables<'_>, code: Code) -> Result<Self, service::Error> {
+        let service = service::Config::from_variables(variables, crate::DEFAULT_LISTEN, code)?;
         let peers = PeersConfig {
             all: variables.list("MAREY_MOTION_INDEX_PEERS"),
             own: variables.get("MAREY_MOTION_INDEX_SELF"),

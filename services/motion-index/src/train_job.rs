@@ -53,7 +53,8 @@ impl Handler for TrainHandler {
         let run = context.run_id().0;
         let report = self.resources.job_report(&context, 0);
         let timings = Timings::default().one("train", &report);
-        let report = RunReport { run_id: run, warnings: &[], timings, frames: None, points: None };
+        let origin = self.resources.origin(&context);
+        let report = RunReport { origin, warnings: &[], timings, frames: None, points: None };
         let built = json!({ "bytes": stored.bytes, "blake3": stored.blake3 });
         let report = report.to_json(&request, json!({ "built": built }))?;
         let report = ResultFile::ready(RUN_JSON, JSON, report);

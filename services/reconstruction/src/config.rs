@@ -5,6 +5,7 @@
 //! | `MAREY_LIVE_STREAMS` | 8 a core | live streams at once |
 //! | `MAREY_LIVE_IDLE_SECS` | 60 | a live stream without frames, or whose poses nobody reads, ends after so long |
 
+use jobs::run_json::Code;
 use service::config::Variables;
 use std::time::Duration;
 
@@ -39,8 +40,9 @@ impl Config {
     ///
     /// # Errors
     /// As [`service::Config::from_variables`].
-    pub fn from_variables(variables: &Variables<'_>) -> Result<Self, service::Error> {
-        let mut config = Self::from(service::Config::from_variables(variables, crate::DEFAULT_LISTEN)?);
+    pub fn from_variables(variables: &Variables<'_>, code: Code) -> Result<Self, service::Error> {
+        let service = service::Config::from_variables(variables, crate::DEFAULT_LISTEN, code)?;
+        let mut config = Self::from(service);
         variables.set("MAREY_LIVE_STREAMS", &mut config.live.max_streams)?;
         let mut idle_secs = config.live.idle_timeout.as_secs();
         variables.set("MAREY_LIVE_IDLE_SECS", &mut idle_secs)?;

@@ -1,6 +1,7 @@
 //! Which trajectories of a file are the control points, and which points of the skeleton they are.
 
 use crate::error::InputError;
+use jobs::PointChoice;
 use kinematics::ControlPoint;
 use markers::MarkerMap;
 use model::{PointTrajectories, Skeleton};
@@ -25,22 +26,17 @@ pub(crate) enum Markers {
 }
 
 impl Markers {
-    /// From what a run was asked for; at most one of `mapping`, `map` (its text) and a `set` other than `auto` is given.
+    /// From what a run was asked for.
     ///
     /// # Errors
     /// If the map or the set is none.
-    pub fn new(
-        mapping: &BTreeMap<String, String>,
-        map: Option<&str>,
-        set: Option<&str>,
-        prefix: Option<&str>,
-    ) -> Result<Self, InputError> {
+    pub fn new(choice: &PointChoice) -> Result<Self, InputError> {
         let with_prefix = |mut map: MarkerMap| {
-            map.prefix = prefix.map(str::to_owned).or(map.prefix);
+            map.prefix = choice.marker_prefix.clone().or(map.prefix);
             map
         };
-        Ok(match (map, set) {
-            _ if !mapping.is_empty() => Self::Pairs(mapping.clone()),
+        Ok(match (choice.marker_map.as_deref(), choice.marker_set.as_deref()) {
+            _ if !choice.mapping.is_empty() => Self::Pairs(choice.mapping.clone()),
             (Some(text), _) => Self::Map(with_prefix(MarkerMap::parse(text)?)),
             (None, None | Some("auto")) => Self::Auto,
             (None, Some("none")) => Self::AsNamed,

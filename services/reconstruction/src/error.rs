@@ -154,7 +154,7 @@ pub(crate) enum CallError {
     #[error("database: {0}")]
     Catalogue(#[from] sqlx::Error),
     #[error(transparent)]
-    Model(#[from] camera_jobs::ModelError),
+    Model(#[from] library::body_model::ModelError),
     #[error("the caller has gone")]
     Gone,
     #[error("too many live streams: this service follows {limit} at once")]

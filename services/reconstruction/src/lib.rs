@@ -32,7 +32,7 @@ mod run_report;
 pub use config::Config;
 pub use error::InputError;
 
-use camera_jobs::Models;
+use library::body_model::Models;
 use priors::Priors;
 use proto::v1::{live_server::LiveServer, reconstruction_server::ReconstructionServer};
 use service::{Parts, Resources, Running};

@@ -31,7 +31,7 @@ impl Handler for MergeHandler {
         context.progress(0.9, "comparing with the ground truth");
         let mut last: Vec<ResultFile> = self.evaluate(&payload, &finished).await?.into_iter().collect();
         let merge = resources.job_report(&context, finished.merged.quality.len());
-        last.push(run_report::file(context.run_id().0, &payload, &finished, &chunks, &merge)?);
+        last.push(run_report::file(resources.origin(&context), &payload, &finished, &chunks, &merge)?);
         let last = results::write(store, &context, last, 0.95..1.0).await?;
         Ok(Outcome::default().artefacts(written).artefacts(last))
     }
@@ -89,7 +89,7 @@ impl MergeHandler {
     ) -> Result<Option<ResultFile>, JobError> {
         let Shared { resources, priors, .. } = &*self.shared;
         let store = &resources.store;
-        let files = &payload.request.files;
+        let files = &payload.request.inputs.files;
         if !files.iter().any(|f| f.role == FileRole::GroundTruth) {
             return Ok(None);
         }

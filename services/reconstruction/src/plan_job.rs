@@ -36,15 +36,18 @@ impl Handler for PlanHandler {
         let (store, memory) = (&resources.store, &resources.memory);
         request.parameters.check().map_err(InputError::from)?;
         context.progress(0.1, "reading the session's files");
-        let files = fetch(store, &request.files, memory.max_object_bytes).await?;
+        let files = fetch(store, &request.inputs.files, memory.max_object_bytes).await?;
         let prior = priors.get(&request.motion_database, request.parameters.window).await?;
         context.check()?;
 
         let (limit, asked) = (memory.max_session_frames, request.clone());
         let (evidence, fitted, bytes) = compute::run(move || -> Result<_, InputError> {
-            let markers = markers(&asked)?;
-            let selection =
-                inputs::Selection { points: &asked.points, markers: &markers, reading: asked.reading() };
+            let markers = Markers::new(&asked.choice)?;
+            let selection = inputs::Selection {
+                points: &asked.choice.points,
+                markers: &markers,
+                reading: asked.reading(),
+            };
             let mut evidence = inputs::read(&files, &selection, prior.database.skeleton())?;
             if is_synthetic(prior.database.skeleton()) {
                 evidence.warnings.push("the motion database is synthetic: drawn, not recorded".to_owned());
@@ -71,13 +74,6 @@ impl Handler for PlanHandler {
             .artefact(artefact)
             .children(children(request, session, evidence, fitted, report)?))
     }
-}
-
-/// What the names of the file of control points stand for.
-fn markers(request: &PlanSparse) -> Result<Markers, InputError> {
-    let [map, set, prefix] =
-        [&request.marker_map, &request.marker_set, &request.marker_prefix].map(Option::as_deref);
-    Markers::new(&request.mapping, map, set, prefix)
 }
 
 /// Sees to a session that came without a skeleton: it is given one that fits, or keeps the database's.

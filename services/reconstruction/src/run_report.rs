@@ -3,14 +3,13 @@
 use crate::feet::{Finished, FootReport};
 use jobs::{
     JobReport,
-    run_json::{RUN_JSON, RunReport, Timings},
+    run_json::{Origin, RUN_JSON, RunReport, Timings},
     sparse::{FittedReport, MergeChunks},
 };
 use queue::JobError;
 use results::{ResultFile, media_type::JSON};
 use serde::Serialize;
 use sparse::FrameQuality;
-use uuid::Uuid;
 
 #[derive(Serialize)]
 struct Own<'a> {
@@ -34,7 +33,7 @@ struct Summary {
 /// # Errors
 /// To be tried again if it is no JSON.
 pub(crate) fn file(
-    run_id: Uuid,
+    origin: Origin,
     job: &MergeChunks,
     finished: &Finished,
     chunks: &[JobReport],
@@ -46,7 +45,7 @@ pub(crate) fn file(
     let timings =
         Timings::default().one("plan", &job.plan).all("chunks", chunks).one("merge", merge).speed(chunks);
     let report = RunReport {
-        run_id,
+        origin,
         warnings: &warnings,
         timings,
         frames: Some((quality.len(), motion_db::FRAME_RATE)),

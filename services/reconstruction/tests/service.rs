@@ -1,7 +1,7 @@
 //! The service as a whole: a real PostgreSQL, a real folder, runs through the queue, poses through gRPC.
 
 use formats::FileRole;
-use jobs::{InputFile, motion_database::MotionDatabaseFile, sparse::PlanSparse};
+use jobs::{InputFile, PointChoice, SessionInputs, motion_database::MotionDatabaseFile, sparse::PlanSparse};
 use proto::v1::{self, reconstruction_client::ReconstructionClient};
 use queue::{Artefact, RunId, RunState};
 use serde_json::Value;
@@ -77,16 +77,14 @@ impl Fixture {
             ..Parameters::default()
         };
         PlanSparse {
-            session_id: self.session,
-            session_name: "walk".to_owned(),
+            inputs: SessionInputs {
+                session_id: self.session,
+                session_name: "walk".to_owned(),
+                files,
+                up: None,
+            },
             motion_database: self.prior.clone(),
-            files,
-            points: vec![],
-            mapping: BTreeMap::new(),
-            marker_set: None,
-            marker_map: None,
-            marker_prefix: None,
-            up: None,
+            choice: PointChoice::default(),
             bvh_metres_per_unit: 0.01,
             parameters,
         }
@@ -215,7 +213,7 @@ async fn a_marker_file_is_read_through_the_mapping() {
     let files = vec![fixture.upload("markers.csv", FileRole::ControlPoints, csv).await];
     let mut request = fixture.request(files);
     let pairs = [("LWRA", "left_wrist"), ("RANK", "right_ankle"), ("head", "head")];
-    request.mapping = pairs.map(|(from, to)| (from.to_owned(), to.to_owned())).into();
+    request.choice.mapping = pairs.map(|(from, to)| (from.to_owned(), to.to_owned())).into();
     let results = fixture.succeeded(fixture.enqueue(&request).await).await;
     let report: Value = serde_json::from_str(&fixture.text(&results["run.json"]).await).unwrap();
     assert_eq!(report["session"]["points"], serde_json::json!(["left_wrist", "right_ankle", "head"]));
@@ -254,7 +252,7 @@ async fn bad_input_fails_the_run_with_a_message_that_names_the_place() {
     ];
     for (files, points, expected) in cases {
         let mut request = fixture.request(files);
-        request.points = points.into_iter().map(str::to_owned).collect();
+        request.choice.points = points.into_iter().map(str::to_owned).collect();
         let status = fixture.sandbox.finished(fixture.enqueue(&request).await).await;
         assert_eq!(status.state, RunState::Failed, "{expected}");
         let message = status.error_message.unwrap();

@@ -1,6 +1,6 @@
 //! What is wrong with a session or with a question.
 
-use camera_jobs::ModelError;
+use library::body_model::ModelError;
 use proto::ErrorCode;
 use queue::JobError;
 use service::FileError;

@@ -24,7 +24,7 @@ mod track_job;
 
 pub use error::InputError;
 
-use camera_jobs::Models;
+use library::body_model::Models;
 use proto::v1::refinement_server::RefinementServer;
 use service::{Config, Parts, Resources, Running};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};

@@ -42,7 +42,7 @@ impl Handler for MergeHandler {
         let tracked = objects::write(store, &context, TRACKED, BINARY, tracked).await?;
         let written = results::write(store, &context, export::files(&finished), 0.2..0.95).await?;
         let merge = resources.job_report(&context, finished.tracked.frames.len());
-        let run = report::run_json(context.run_id().0, &session, &finished, &chunks, &merge)?;
+        let run = report::run_json(resources.origin(&context), &session, &finished, &chunks, &merge)?;
         let run = results::write_one(store, &context, run).await?;
         Ok(Outcome::default().artefact(tracked).artefacts(written).artefact(run))
     }

@@ -4,13 +4,12 @@ use body::Limb;
 use jobs::{
     JobReport,
     multi_view::{CameraReport, TrackingSession},
-    run_json::{RUN_JSON, RunReport, Timings},
+    run_json::{Origin, RUN_JSON, RunReport, Timings},
 };
 use queue::JobError;
 use results::{ResultFile, media_type::JSON};
 use serde_json::{Value, json};
 use tracking::{Stage, Tracked};
-use uuid::Uuid;
 
 use crate::{
     finished::{Finished, Meeting},
@@ -55,7 +54,7 @@ fn found(finished: &Finished) -> Value {
 /// # Errors
 /// To be tried again if it is no JSON.
 pub(crate) fn run_json(
-    run_id: Uuid,
+    origin: Origin,
     session: &TrackingSession,
     finished: &Finished,
     chunks: &[JobReport],
@@ -74,7 +73,7 @@ pub(crate) fn run_json(
         "tracking": found(finished),
     });
     let frames = Some((finished.tracked.frames.len(), finished.frame_rate));
-    let report = RunReport { run_id, warnings: &warnings, timings, frames, points: None };
+    let report = RunReport { origin, warnings: &warnings, timings, frames, points: None };
     Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(&session.request, own)?))
 }
 

@@ -82,7 +82,7 @@ impl Handler for BuildHandler {
         let stored = store.put(&key, bytes.into()).await.map_err(JobError::retry)?;
         let report = self.shared.resources.job_report(&context, 0);
         let run = RunReport {
-            run_id: context.run_id().0,
+            origin: self.shared.resources.origin(&context),
             warnings: &contents.warnings,
             timings: Timings::default().one("build", &report),
             frames: None,

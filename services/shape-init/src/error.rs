@@ -1,6 +1,7 @@
 //! What is wrong with a session's files or with a question.
 
-use camera_jobs::{ModelError, ShapeError};
+use camera_jobs::ShapeError;
+use library::body_model::ModelError;
 use proto::ErrorCode;
 use queue::JobError;
 use service::FileError;

@@ -34,7 +34,7 @@ mod sources;
 
 pub use error::InputError;
 
-use camera_jobs::Models;
+use library::body_model::Models;
 use proto::v1::shape_init_server::ShapeInitServer;
 use service::{Config, Parts, Resources, Running};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};

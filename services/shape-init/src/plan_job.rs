@@ -39,7 +39,7 @@ impl Handler for PlanHandler {
         // What is wrong with the model is said now, not when all silhouettes are made.
         self.shared.models.get(&request.body_model).await?;
         let (sources, picture_size) = self.sources(&context, &request).await?;
-        let file = calibration_file(&request.files)?;
+        let file = calibration_file(&request.inputs.files)?;
         let bytes = self.shared.resources.read_file(file, MAX_CALIBRATION_BYTES).await?;
         let (mut warnings, cameras) = read_calibration(&request, file, &bytes, picture_size)?;
         let names: Vec<String> = cameras.iter().map(|camera| camera.name.clone()).collect();
@@ -62,7 +62,7 @@ impl PlanHandler {
         let resources = &self.shared.resources;
         let most = resources.memory.max_build_bytes;
         let (mut found, mut size) = (Vec::new(), None);
-        for file in &request.files {
+        for file in &request.inputs.files {
             context.check()?;
             if !sources::is_archive(file) {
                 found.extend(sources::from_file(file));
@@ -117,7 +117,7 @@ fn read_calibration(
     bytes: &Bytes,
     image_size: Option<[u32; 2]>,
 ) -> Result<(Vec<String>, Vec<Camera>), InputError> {
-    let up = request.up.map(Into::into);
+    let up = request.inputs.up.map(Into::into);
     let options = calibration::Options { up, metres_per_unit: request.metres_per_unit, image_size };
     let read = calibration::read(&file.name, bytes, &options).map_err(FileError::in_file(&file.name))?;
     let warnings = read.warnings.into_iter().map(|w| format!("{}: {}", file.name, w.message)).collect();
@@ -150,11 +150,8 @@ fn children(
     }
     let last = match request.inverse_kinematics.clone() {
         Some(how) => ChildJob::new(&SolveInverseKinematics {
-            session_id: request.session_id,
-            session_name: request.session_name,
+            inputs: request.inputs,
             body_model: request.body_model,
-            files: request.files,
-            up: request.up,
             how,
             cameras: Some(CamerasPlanned { first_frame: request.parameters.first_frame, warnings, plan }),
         }),

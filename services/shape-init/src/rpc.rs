@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use camera_jobs::{Described, views};
+use camera_jobs::views;
+use jobs::inverse_kinematics::BodyDescription;
 use proto::v1::{self, MeshFormat, shape_init_server::ShapeInit};
 use service::{FileError, compute::Slots};
 use tonic::{Request, Response, Status};
@@ -29,14 +30,14 @@ impl Rpc {
         let (_, model) =
             self.shared.models.for_request(&request.body_model_id).await.map_err(CallError::from)?;
         let sampled = self.slots.run(move || {
-            let described = Described {
-                alpha: &request.alpha,
+            let described = BodyDescription {
+                alpha: request.alpha.clone(),
                 stature_m: request.stature_m,
                 mass_kg: request.mass_kg,
                 age_years: request.age_years,
-                sex: &request.sex,
+                sex: Some(request.sex.clone()),
             };
-            let shape = described.shape(&model)?;
+            let shape = camera_jobs::shape(&model, &described)?;
             let mesh = match request.format() {
                 MeshFormat::Glb => body::glb(&model, &shape, None).map_err(InputError::from)?,
                 MeshFormat::Ply => formats::ply::write(&shape.mesh(&model)),

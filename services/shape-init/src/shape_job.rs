@@ -8,16 +8,15 @@ use formats::image_files;
 use jobs::{
     JobReport, Object, file_part,
     multi_view::{CameraClips, CameraReport, FitShape, TrackingSession, picture_name},
-    run_json::{RUN_JSON, RunReport, Timings},
+    run_json::{Origin, RUN_JSON, RunReport, Timings},
 };
 use model::Image;
 use multi_view::Parameters;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
 use results::{ResultFile, media_type::JSON};
 use serde_json::json;
-use service::{compute, objects};
+use service::{Resources, compute, objects};
 use shape_fit::Fit;
-use uuid::Uuid;
 
 use crate::{
     InputError, Shared,
@@ -53,12 +52,8 @@ impl Handler for ShapeHandler {
         let parameters = &request.parameters;
         let shown = if parameters.track { FIT_SHOWN } else { 1.0 };
         context.progress(0.0, "reading the silhouettes");
-        let artefacts = resources.artefacts_before(&context).await?;
-        let cameras = reports(resources, &artefacts).await?;
+        let Evidence { artefacts, cameras, clips } = Evidence::read(resources, &context).await?;
         warnings.extend(cameras.iter().flat_map(|camera| camera.warnings.iter().cloned()));
-        let clips: Result<Vec<_>, _> =
-            cameras.iter().map(|camera| CameraClips::new(camera, &artefacts)).collect();
-        let clips = clips?;
         let end_frame = end_frame(&cameras, &mut warnings);
         let model = models.get(&request.body_model).await?;
         context.check()?;
@@ -78,32 +73,25 @@ impl Handler for ShapeHandler {
         warnings.extend(left_out);
         warnings.extend(doubts(&fits));
         context.progress(0.7 * shown, "carving the visual hull");
-        let (seen, cell_m) = (moments.clone(), parameters.hull_voxel_m);
-        let carved = compute::run(move || seen.first().map(|first| hull(&first.views, cell_m))).await;
+        let mut files = Vec::from_iter(carve(&moments, parameters.hull_voxel_m, &mut warnings).await);
         context.check()?;
-        let mut files = Vec::new();
-        match carved {
-            Some(Ok(carved)) => files.push(export::mesh("hull.ply", carved.mesh)),
-            // The body was found all the same.
-            Some(Err(error)) => warnings.push(format!("no visual hull: {error}")),
-            None => {}
-        }
         let frame_rate = frame_rate(parameters, &cameras, &mut warnings);
         files.extend(body(&model, &moments, &fits, frame_rate, parameters.track, &warnings).await?);
-        let mut written = results::write(store, &context, files, 0.8 * shown..0.85 * shown).await?;
+        let written = results::write(store, &context, files, 0.8 * shown..0.85 * shown).await?;
+        let mut outcome = Outcome::default().artefacts(written);
         for (index, camera) in cameras.iter().enumerate() {
             context.check()?;
             let share = 0.85 + 0.14 * index as f64 / cameras.len() as f64;
             context.progress(share * shown, "drawing overlays");
             if let Some(file) = self.overlay(camera, &artefacts, &moments, (&model, &fits)).await? {
-                written.push(results::write_one(store, &context, file).await?);
+                outcome = outcome.artefact(results::write_one(store, &context, file).await?);
             }
         }
-        let outcome = Outcome::default().artefacts(written);
         let report = resources.job_report(&context, moments.len());
         if !parameters.track {
             let job = FitShape { request, warnings, plan };
-            let run = run_json(context.run_id().0, &job, &cameras, (moments.len(), frame_rate), &report)?;
+            let run =
+                run_json(resources.origin(&context), &job, &cameras, (moments.len(), frame_rate), &report)?;
             return Ok(outcome.artefact(results::write_one(store, &context, run).await?));
         }
         let session = TrackingSession {
@@ -122,6 +110,36 @@ impl Handler for ShapeHandler {
         let artefact = objects::write(store, &context, SESSION, JSON, content).await?;
         let children = children(&session, &Object::from(&artefact))?;
         Ok(outcome.artefact(artefact).children(children))
+    }
+}
+
+/// What the jobs before this one left.
+struct Evidence {
+    artefacts: Vec<Artefact>,
+    cameras: Vec<CameraReport>,
+    /// of every camera
+    clips: Vec<CameraClips>,
+}
+
+impl Evidence {
+    async fn read(resources: &Resources, context: &JobContext) -> Result<Self, JobError> {
+        let artefacts = resources.artefacts_before(context).await?;
+        let cameras = reports(resources, &artefacts).await?;
+        let clips: Result<_, _> = cameras.iter().map(|camera| CameraClips::new(camera, &artefacts)).collect();
+        Ok(Self { clips: clips?, cameras, artefacts })
+    }
+}
+
+/// The visual hull of the first moment. The body was found all the same where there is none.
+async fn carve(moments: &Arc<Vec<Moment>>, cell_m: f64, warnings: &mut Vec<String>) -> Option<ResultFile> {
+    let moments = moments.clone();
+    let carved = compute::run(move || moments.first().map(|first| hull(&first.views, cell_m))).await?;
+    match carved {
+        Ok(carved) => Some(export::mesh("hull.ply", carved.mesh)),
+        Err(error) => {
+            warnings.push(format!("no visual hull: {error}"));
+            None
+        }
     }
 }
 
@@ -183,7 +201,7 @@ async fn body(
 
 /// `run.json` of a run whose person nobody follows.
 fn run_json(
-    run_id: Uuid,
+    origin: Origin,
     job: &FitShape,
     cameras: &[CameraReport],
     frames: (usize, f64),
@@ -194,7 +212,7 @@ fn run_json(
         .all("cameras", cameras.iter().map(|camera| &camera.job))
         .one("initialise", report);
     let own = json!({ "cameras": cameras.iter().map(CameraReport::summary).collect::<Vec<_>>() });
-    let run = RunReport { run_id, warnings: &job.warnings, timings, frames: Some(frames), points: None };
+    let run = RunReport { origin, warnings: &job.warnings, timings, frames: Some(frames), points: None };
     Ok(ResultFile::ready(RUN_JSON, JSON, run.to_json(&job.request, own)?))
 }
 

@@ -94,13 +94,10 @@ impl CameraFields {
         check_files(&on.files)?;
         let parameters = self.resolve()?;
         Ok(PlanMultiView {
-            session_id: on.session.id,
-            session_name: on.session.name,
+            inputs: on.inputs(up),
             body_model: body_model.ready()?,
-            files: on.files,
             cameras: self.cameras,
             camera_files: self.camera_files,
-            up,
             metres_per_unit: self.metres_per_unit,
             parameters,
             inverse_kinematics,

@@ -2,7 +2,7 @@
 
 use formats::FileRole;
 use jobs::inverse_kinematics::{
-    BodyDescription, IkSolver, InverseKinematics, RUN_KIND, SolveInverseKinematics,
+    BodyDescription, InverseKinematics, Method, RUN_KIND, SolveInverseKinematics,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -113,15 +113,8 @@ impl SessionRun for InverseKinematicsRun {
                 "the session has no measured points; upload a .csv, .trc or .c3d file first".into(),
             ));
         }
-        let markers = self.markers;
-        let how = InverseKinematics {
-            points: markers.points,
-            mapping: markers.mapping,
-            marker_set: markers.marker_set,
-            marker_map: markers.marker_map,
-            marker_prefix: markers.marker_prefix,
-            ..self.inverse_kinematics.resolve(solver)
-        };
+        let choice = self.markers.into();
+        let how = InverseKinematics { choice, ..self.inverse_kinematics.resolve(solver) };
         let session_id = on.session.id;
         if !solver.uses_images()
             && let Some(field) = self.cameras.first_given()?
@@ -137,11 +130,8 @@ impl SessionRun for InverseKinematicsRun {
             NewRun::new(RUN_KIND, &plan)?
         } else {
             let solve = SolveInverseKinematics {
-                session_id,
-                session_name: on.session.name,
+                inputs: on.inputs(self.up),
                 body_model: body_model.ready()?,
-                files: on.files,
-                up: self.up,
                 how,
                 cameras: None,
             };
@@ -167,7 +157,7 @@ impl InverseKinematicsRequest {
         Ok(())
     }
 
-    fn solver(&self) -> Result<Option<IkSolver>> {
+    fn solver(&self) -> Result<Option<Method>> {
         let Some(name) = &self.solver else { return Ok(None) };
         serde_json::from_value(name.as_str().into()).map(Some).map_err(|_| {
             Error::Unprocessable(format!(
@@ -178,12 +168,12 @@ impl InverseKinematicsRequest {
     }
 
     /// The solver that is named, or the one that suits the session's files.
-    fn solver_for(&self, on: &OnSession) -> Result<IkSolver> {
+    fn solver_for(&self, on: &OnSession) -> Result<Method> {
         let has_cameras = on.has(FileRole::Calibration)
             && [FileRole::Video, FileRole::Images, FileRole::Masks].into_iter().any(|role| on.has(role));
         match self.solver()? {
-            None if has_cameras => Ok(IkSolver::ImageConstrained),
-            None => Ok(IkSolver::Priority),
+            None if has_cameras => Ok(Method::ImageConstrained),
+            None => Ok(Method::Priority),
             Some(solver) if solver.uses_images() && !has_cameras => Err(Error::Unprocessable(format!(
                 "solver is {:?}, which needs silhouettes; upload a calibration and what the cameras saw, or choose plain or \
                  priority",
@@ -194,7 +184,7 @@ impl InverseKinematicsRequest {
     }
 
     /// Everything resolved, but for points and markers.
-    fn resolve(self, solver: IkSolver) -> InverseKinematics {
+    fn resolve(self, solver: Method) -> InverseKinematics {
         InverseKinematics {
             solver,
             steps: self.steps.unwrap_or(STEPS.1),

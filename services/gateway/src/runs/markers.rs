@@ -1,5 +1,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
+use jobs::PointChoice;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -30,6 +31,13 @@ pub(super) struct MarkerFields {
     /// what the names of the performer's markers begin with, where a file has several people
     #[schema(example = "Anna:")]
     pub marker_prefix: Option<String>,
+}
+
+impl From<MarkerFields> for PointChoice {
+    fn from(fields: MarkerFields) -> Self {
+        let MarkerFields { points, mapping, marker_set, marker_map, marker_prefix } = fields;
+        Self { points, mapping, marker_set, marker_map, marker_prefix }
+    }
 }
 
 impl MarkerFields {

@@ -30,3 +30,8 @@ const KINDS: &[Kind] = &[
     Kind::new::<multi_view::MultiViewRun>(),
     Kind::new::<inverse_kinematics::InverseKinematicsRun>(),
 ];
+
+/// The kinds of runs on sessions, as requests name them.
+pub fn session_run_kinds() -> impl Iterator<Item = &'static str> {
+    KINDS.iter().map(|kind| kind.name)
+}

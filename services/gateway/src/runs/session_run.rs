@@ -4,7 +4,8 @@ use std::borrow::Cow;
 
 use formats::FileRole;
 use futures::future::BoxFuture;
-use jobs::InputFile;
+use jobs::{InputFile, SessionInputs};
+use model::Axis;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use sqlx::PgConnection;
@@ -36,6 +37,11 @@ impl OnSession {
     /// Whether there is a file of that role.
     pub fn has(&self, role: FileRole) -> bool {
         self.files.iter().any(|file| file.role == role)
+    }
+
+    /// What the run's jobs are given of it.
+    pub fn inputs(self, up: Option<Axis>) -> SessionInputs {
+        SessionInputs { session_id: self.session.id, session_name: self.session.name, files: self.files, up }
     }
 }
 

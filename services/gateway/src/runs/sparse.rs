@@ -2,7 +2,10 @@
 
 use ::sparse::{Method, Parameters};
 use formats::FileRole;
-use jobs::sparse::{self, PlanSparse};
+use jobs::{
+    PointChoice,
+    sparse::{self, PlanSparse},
+};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use sqlx::PgConnection;
@@ -90,18 +93,12 @@ impl SessionRun for SparseRun {
             ));
         }
         let session_id = on.session.id;
-        let markers = self.markers;
+        let mut choice = PointChoice::from(self.markers);
+        choice.marker_set.get_or_insert_with(|| "auto".to_owned());
         let plan = PlanSparse {
-            session_id,
-            session_name: on.session.name,
+            inputs: on.inputs(self.up),
             motion_database,
-            files: on.files,
-            points: markers.points,
-            mapping: markers.mapping,
-            marker_set: Some(markers.marker_set.unwrap_or_else(|| "auto".to_owned())),
-            marker_map: markers.marker_map,
-            marker_prefix: markers.marker_prefix,
-            up: self.up,
+            choice,
             bvh_metres_per_unit: self
                 .bvh_metres_per_unit
                 .unwrap_or(formats::BvhOptions::default().metres_per_unit),

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use camera_jobs::{Described, views};
+use camera_jobs::views;
 use inverse_kinematics::{Figure, Method};
+use jobs::inverse_kinematics::BodyDescription;
 use kinematics::control_points;
 use proto::v1::{self, InverseKinematicsMethod as Wire, solve_inverse_kinematics_request::Performer};
 use tokio_util::sync::CancellationToken;
@@ -123,14 +124,14 @@ fn figure(
 ) -> Result<Figure, CallError> {
     let figure = match (&request.performer, model) {
         (Some(Performer::Body(body)), Some(model)) => {
-            let described = Described {
-                alpha: &body.alpha,
+            let described = BodyDescription {
+                alpha: body.alpha.clone(),
                 stature_m: body.stature_m,
                 mass_kg: body.mass_kg,
                 age_years: body.age_years,
-                sex: &body.sex,
+                sex: Some(body.sex.clone()),
             };
-            let shape = described.shape(model)?;
+            let shape = camera_jobs::shape(model, &described)?;
             let skeleton = model.skeleton(&shape).map_err(InputError::from)?;
             let points = control_points(&skeleton, names).map_err(InputError::from)?;
             Figure::body(model, &shape, &points)

@@ -24,16 +24,11 @@ pub(super) fn read(
     skeleton: &Skeleton,
     warnings: &mut Vec<String>,
 ) -> Result<Chosen, InputError> {
-    let markers = Markers::new(
-        &how.mapping,
-        how.marker_map.as_deref(),
-        how.marker_set.as_deref(),
-        how.marker_prefix.as_deref(),
-    )?;
+    let markers = Markers::new(&how.choice)?;
     let points = PointsOptions { up, ..PointsOptions::default() };
     let reading = session::Options { points, ..session::Options::default() };
     let (file, trajectories) = inputs::measured_points(files, reading, warnings)?;
-    let mut wanted = how.points.clone();
+    let mut wanted = how.choice.points.clone();
     if wanted.is_empty() && matches!(markers, Markers::Auto | Markers::AsNamed) {
         let is_known = |name: &&String| control_points(skeleton, &[name]).is_ok();
         let (known, unknown): (Vec<&String>, Vec<&String>) = trajectories.names().iter().partition(is_known);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use body::{BodyModel, Shape};
-use camera_jobs::{Described, Silhouettes, reports};
+use camera_jobs::{Silhouettes, reports};
 use formats::FileRole;
 use inverse_kinematics::{Figure, sequence::Solved};
 use jobs::{
@@ -21,7 +21,7 @@ use super::{
     evidence::{self, Frames},
     export,
     finished::Finished,
-    method, report,
+    report,
 };
 use crate::{InputError, Shared, plan_job};
 
@@ -61,7 +61,7 @@ impl Handler for IkHandler {
         let (watched, how) = (context.clone(), request.how.clone());
         let solved = compute::run(move || -> Result<_, InputError> {
             let Problem { figure, measured, .. } = &problem;
-            let mut solver = figure.solver(method(how.solver), how.steps)?;
+            let mut solver = figure.solver(how.solver, how.steps)?;
             let mut solved = Vec::with_capacity(count);
             for (index, measured) in measured.iter().enumerate() {
                 if watched.is_cancelled() {
@@ -82,7 +82,7 @@ impl Handler for IkHandler {
         let written =
             results::write(&resources.store, &context, export::files(&finished), 0.95..0.99).await?;
         let job = resources.job_report(&context, finished.solved.len());
-        let run = report::run_json(context.run_id().0, &request, &cameras, &finished, &job)?;
+        let run = report::run_json(resources.origin(&context), &request, &cameras, &finished, &job)?;
         let run = results::write_one(&resources.store, &context, run).await?;
         Ok(Outcome::default().artefacts(written).artefact(run))
     }
@@ -128,7 +128,7 @@ impl IkHandler {
     ) -> Result<Problem, JobError> {
         let resources = &self.shared.resources;
         let is_wanted = |file: &&InputFile| file.role == FileRole::ControlPoints;
-        let files: Vec<_> = request.files.iter().filter(is_wanted).cloned().collect();
+        let files: Vec<_> = request.inputs.files.iter().filter(is_wanted).cloned().collect();
         let files = plan_job::fetch(&resources.store, &files, resources.memory.max_object_bytes).await?;
         let (request, limit) = (request.clone(), resources.memory.max_session_frames);
         let mut warnings = request.cameras.as_ref().map_or(Vec::new(), |planned| planned.warnings.clone());
@@ -136,17 +136,9 @@ impl IkHandler {
         let rate_of_cameras = frame_rate(cameras, &mut warnings);
         let end = cameras.iter().map(|camera| camera.end_frame).min();
         let read = compute::run(move || -> Result<Problem, InputError> {
-            let body = &request.how.body;
-            let described = Described {
-                alpha: &body.alpha,
-                stature_m: body.stature_m,
-                mass_kg: body.mass_kg,
-                age_years: body.age_years,
-                sex: body.sex.as_deref().unwrap_or_default(),
-            };
-            let shape = described.shape(&model)?;
+            let shape = camera_jobs::shape(&model, &request.how.body)?;
             let skeleton = model.skeleton(&shape)?;
-            let chosen = evidence::read(&files, &request.how, request.up, &skeleton, &mut warnings)?;
+            let chosen = evidence::read(&files, &request.how, request.inputs.up, &skeleton, &mut warnings)?;
             let own = chosen.trajectories.frame_rate();
             let rate = request.how.frame_rate.or(rate_of_cameras).unwrap_or(own);
             if !FRAME_RATES.contains(&rate) {

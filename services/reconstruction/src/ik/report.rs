@@ -7,12 +7,11 @@ use jobs::{
     JobReport,
     inverse_kinematics::SolveInverseKinematics,
     multi_view::CameraReport,
-    run_json::{RUN_JSON, RunReport, Timings},
+    run_json::{Origin, RUN_JSON, RunReport, Timings},
 };
 use queue::JobError;
 use results::{ResultFile, media_type::JSON};
 use serde_json::json;
-use uuid::Uuid;
 
 use super::finished::Finished;
 
@@ -75,7 +74,7 @@ pub(super) fn doubts(solved: &[Solved]) -> Vec<String> {
 /// # Errors
 /// To be tried again if it is no JSON.
 pub(super) fn run_json(
-    run_id: Uuid,
+    origin: Origin,
     request: &SolveInverseKinematics,
     cameras: &[CameraReport],
     finished: &Finished,
@@ -109,7 +108,7 @@ pub(super) fn run_json(
     let timings =
         timings.all("cameras", cameras.iter().map(|camera| &camera.job)).one("solve", job).speed([job]);
     let report = RunReport {
-        run_id,
+        origin,
         warnings: &finished.warnings,
         timings,
         frames: Some((solved.len(), finished.frame_rate)),

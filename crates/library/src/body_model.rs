@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use body::{BodyModel, shipped};
 use jobs::body_model::{BodyModelFile, SHIPPED};
-use library::Cache;
 use proto::{CallError, ErrorCode};
 use queue::JobError;
 use service::{Resources, compute, objects};
 use uuid::Uuid;
+
+use crate::Cache;
 
 /// What models take together in memory, bytes; one takes about six times its file.
 const CACHE_BYTES: u64 = 256 << 20;

@@ -1,0 +1,60 @@
+use std::collections::BTreeMap;
+
+use model::Axis;
+use serde::{Deserialize, Serialize};
+use uuid::Uuid;
+
+use crate::{
+    InputFile,
+    run_json::{FileReport, SessionReport, Subject},
+};
+
+/// The capture session of a run: the part that the payloads of all run kinds on sessions have in common.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SessionInputs {
+    /// The session.
+    pub session_id: Uuid,
+    /// Its name.
+    #[serde(default)]
+    pub session_name: String,
+    /// Its files, in order of name.
+    pub files: Vec<InputFile>,
+    /// Axis of its files that points up, where they don't say it or say it wrong.
+    #[serde(default)]
+    pub up: Option<Axis>,
+}
+
+impl SessionInputs {
+    /// The session as `run.json` names it.
+    pub(crate) fn subject<'a>(&'a self, choice: Option<&'a PointChoice>) -> Subject<'a> {
+        Subject::Session(SessionReport {
+            id: self.session_id,
+            name: &self.session_name,
+            files: FileReport::all(&self.files),
+            mapping: choice.map(|choice| &choice.mapping),
+            ..SessionReport::default()
+        })
+    }
+}
+
+/// Which measured points of a file are used, and which of its markers make them. At most one of `mapping`, `marker_map` and
+/// a `marker_set` other than `auto` is given.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PointChoice {
+    /// Points to use, by name; empty: those that `mapping` makes, or else all that the file has.
+    #[serde(default)]
+    pub points: Vec<String>,
+    /// Name in the file → name of a control point or joint.
+    #[serde(default)]
+    pub mapping: BTreeMap<String, String>,
+    /// The marker set whose names the file has: `auto` (or nothing) to find out, `none` for control points under their
+    /// own names, or a preset's name.
+    #[serde(default)]
+    pub marker_set: Option<String>,
+    /// Text of a marker map, TOML.
+    #[serde(default)]
+    pub marker_map: Option<String>,
+    /// What the names of the performer's markers begin with.
+    #[serde(default)]
+    pub marker_prefix: Option<String>,
+}
