@@ -15,6 +15,13 @@ phase() {
 }
 
 scripts/phase.sh "set-up" scripts/setup.sh
+# The pages' client in Python needs a package from PyPI; where there is no Python for it, that example is skipped.
+python=$(realpath -m "${CARGO_TARGET_DIR:-target}")/python
+if ! python3 -c 'import websockets.asyncio' 2>/dev/null; then
+    [[ -x $python/bin/pip ]] || python3 -m venv "$python" >/dev/null || true
+    "$python/bin/pip" install --quiet websockets 2>/dev/null || true
+    export PATH="$python/bin:$PATH"
+fi
 phase "tests of the workspace" cargo test --release --locked --workspace --no-fail-fast \
     -- --show-output
 case $compose in

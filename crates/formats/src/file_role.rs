@@ -35,6 +35,8 @@ const CALIBRATION: [&str; 6] = ["toml", "json", "yml", "yaml", "xml", "qca.txt"]
 const VIDEO: [&str; 6] = ["mp4", "mov", "m4v", "avi", "mkv", "webm"];
 const PICTURE: [&str; 3] = ["png", "jpg", "jpeg"];
 const ARCHIVE: [&str; 4] = ["zip", "tar", "tgz", "tzst"];
+/// The same as people write them.
+const ARCHIVES: [&str; 4] = ["zip", "tar", "tar.gz", "tar.zst"];
 const MOTION: [&str; 3] = ["asf", "amc", "bvh"];
 const SCAN: [&str; 5] = ["obj", "ply", "npy", "json", "csv"];
 
@@ -105,6 +107,26 @@ impl FileRole {
         }
     }
 
+    /// The endings of files that can have this role in a session, as a sentence has them: `.csv, .trc or .c3d`.
+    pub fn endings(self) -> String {
+        let extensions: Vec<&str> = match self {
+            Self::Skeleton => vec!["asf", "bvh"],
+            Self::ControlPoints => PointsFormat::extensions().into(),
+            Self::GroundTruth => vec!["amc", "bvh"],
+            Self::Calibration => CALIBRATION.into(),
+            Self::Video => VIDEO.into(),
+            Self::Images | Self::Masks => ARCHIVES.into(),
+            Self::Plate => [&PICTURE[..], &ARCHIVES].concat(),
+            Self::Motion => [&MOTION[..], &ARCHIVES].concat(),
+            Self::Scans => [&SCAN[..], &ARCHIVES].concat(),
+        };
+        let dotted: Vec<String> = extensions.iter().map(|extension| format!(".{extension}")).collect();
+        match dotted.split_last() {
+            Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+            _ => dotted.concat(),
+        }
+    }
+
     /// Whether motion databases are built from files of that name.
     pub fn is_motion_file(name: &str) -> bool {
         let extension = extension(name);
@@ -167,6 +189,23 @@ mod tests {
         assert!(FileRole::is_motion_file("all.tgz"));
         assert!(!FileRole::is_motion_file("scan.obj"));
         assert!(!FileRole::is_motion_file("points.csv"));
+    }
+
+    #[test]
+    fn files_with_the_endings_of_a_role_can_have_it() {
+        assert_eq!(FileRole::ControlPoints.endings(), ".csv, .trc or .c3d");
+        for role in FileRole::ALL {
+            let endings = role.endings().replace(" or ", ", ");
+            for ending in endings.split(", ") {
+                let name = format!("a{ending}");
+                let fits = match role {
+                    FileRole::Motion => FileRole::is_motion_file(&name),
+                    FileRole::Scans => FileRole::is_scan_file(&name),
+                    _ => role.fits_session_file(&name),
+                };
+                assert!(fits, "{name} as {role}");
+            }
+        }
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use model::{Motion, PointTrajectories};
 
 use crate::{
-    BvhOptions, PointsOptions, Read, Result, amc, asf, bvh, c3d, extension::extension, points_csv, trc,
+    BvhOptions, Error, FileRole, PointsOptions, Read, Result, amc, archive, asf, bvh, c3d,
+    extension::extension, points_csv, trc,
 };
 
 /// Frame rate of an AMC that does not state it when nothing else fits: CMU's, Hz.
@@ -39,12 +40,38 @@ impl PointsFormat {
         POINTS.into_iter().find(|format| format.extension == extension)
     }
 
+    /// The extensions of all formats.
+    pub(crate) fn extensions() -> [&'static str; POINTS.len()] {
+        POINTS.map(|format| format.extension)
+    }
+
     /// Reads the file, unpacked.
     ///
     /// # Errors
     /// Says where, what was found and what was expected.
     pub fn read(self, bytes: &[u8], options: &Options) -> Result<Read<PointTrajectories>> {
         (self.read)(bytes, &options.points)
+    }
+}
+
+/// Largest file of points that [`read_points`] unpacks, bytes: two hours of 120 frames a second of 50 markers.
+const MAX_POINTS_BYTES: u64 = 1 << 30;
+
+/// The measured points of a file as it lies on a disk: the format is told by its name, and it is unpacked if that ends with
+/// `.zst` or `.gz`.
+///
+/// # Errors
+/// If it is of no such format by its name; as the readers else.
+pub fn read_points(name: &str, bytes: &[u8], options: &Options) -> Result<Read<PointTrajectories>> {
+    let format = PointsFormat::from_name(name).ok_or_else(|| {
+        Error::whole_file(
+            "a file of another kind",
+            format!("{} by its name", FileRole::ControlPoints.endings()),
+        )
+    })?;
+    match archive::unpacked(name, bytes, MAX_POINTS_BYTES)? {
+        Some(unpacked) => format.read(&unpacked, options),
+        None => format.read(bytes, options),
     }
 }
 

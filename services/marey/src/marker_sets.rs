@@ -6,13 +6,11 @@ use std::{
 };
 
 use anyhow::{Context, bail};
-use formats::{PointsOptions, Read, archive};
+use formats::{PointsOptions, Read, session};
 use markers::{Fit, MarkerMap, fits};
 use model::{Axis, PointTrajectories};
 use serde_json::{Map, Value, json};
 
-/// Largest file that is looked at, bytes.
-const MAX_BYTES: u64 = 1 << 30;
 /// Fits that are shown.
 const SHOWN: usize = 3;
 
@@ -164,23 +162,11 @@ fn text(name: &str) -> anyhow::Result<String> {
 }
 
 fn read(path: &Path, up: Option<Axis>) -> anyhow::Result<Read<PointTrajectories>> {
-    let name = path.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let mut bytes = fs::read(path).with_context(|| path.display().to_string())?;
-    let plain = name.strip_suffix(".zst").or(name.strip_suffix(".gz")).unwrap_or(&name);
-    if plain != name {
-        let limits = archive::Limits { total_bytes: MAX_BYTES, entries: 1, ..archive::Limits::default() };
-        let entries = archive::entries(&name, &bytes, &limits);
-        let mut entries = entries.with_context(|| path.display().to_string())?;
-        bytes = entries.pop().map(|entry| entry.bytes).unwrap_or_default();
-    }
-    let options = PointsOptions { up, ..PointsOptions::default() };
-    let read = match plain.rsplit_once('.').map_or("", |(_, extension)| extension) {
-        "c3d" => formats::c3d::read(&bytes, &options),
-        "trc" => formats::trc::read(&bytes, &options),
-        "csv" => formats::points_csv::read_with(&bytes, &options),
-        _ => bail!("{}: found a file of another kind, expected .c3d, .trc or .csv", path.display()),
-    };
-    read.with_context(|| path.display().to_string())
+    let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+    let points = PointsOptions { up, ..PointsOptions::default() };
+    let options = session::Options { points, ..session::Options::default() };
+    session::read_points(&path.to_string_lossy(), &bytes, &options)
+        .with_context(|| path.display().to_string())
 }
 
 /// The fields of a request that `--map` stands for: pairs, one file, or one marker set.

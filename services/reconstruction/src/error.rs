@@ -18,14 +18,12 @@ pub enum InputError {
         source: formats::Error,
     },
     /// A file is of a kind that its role does not take.
-    #[error("{file}: found a file of another kind, expected {expected} for role {role}")]
+    #[error("{file}: found a file of another kind, expected {} for role {role}", .role.endings())]
     Kind {
         /// Name of the file.
         file: String,
         /// Its role.
         role: FileRole,
-        /// What it may be.
-        expected: &'static str,
     },
     /// A role that must be filled once.
     #[error("session has {found} files of role {role}{names}, expected {expected}")]
@@ -37,7 +35,7 @@ pub enum InputError {
         /// Which, in brackets.
         names: String,
         /// How many there should be.
-        expected: &'static str,
+        expected: String,
     },
     /// The mapping names something that is not in the file.
     #[error("{name:?} of the mapping is not in {file}, which has {has}")]

@@ -103,7 +103,7 @@ pub(crate) fn ground_truth(
     seconds: f64,
 ) -> Result<Option<Read<Motion>>, InputError> {
     let Some(file) = at_most_one(files, FileRole::GroundTruth)? else { return Ok(None) };
-    let format = MotionFormat::from_name(&file.name).ok_or_else(|| kind_error(file, "an AMC or BVH file"))?;
+    let format = MotionFormat::from_name(&file.name).ok_or_else(|| kind_error(file))?;
     let is_asf = |f: &&NamedBytes| SkeletonFormat::from_name(&f.name) == Some(SkeletonFormat::Asf);
     let own = match format {
         MotionFormat::Amc => at_most_one(files, FileRole::Skeleton)?.filter(is_asf),
@@ -122,8 +122,7 @@ fn read_skeleton(
     reading: session::Options,
     warnings: &mut Vec<String>,
 ) -> Result<asf::File, InputError> {
-    let format =
-        SkeletonFormat::from_name(&file.name).ok_or_else(|| kind_error(file, "an ASF or BVH file"))?;
+    let format = SkeletonFormat::from_name(&file.name).ok_or_else(|| kind_error(file))?;
     let read = format.read(&file.bytes, &reading);
     Ok(note(read.map_err(|source| InputError::File { file: file.name.clone(), source })?, file, warnings))
 }
@@ -141,7 +140,7 @@ pub(crate) fn measured_points(
         role: FileRole::ControlPoints,
         found: 0,
         names: String::new(),
-        expected: "one (CSV, TRC or C3D)",
+        expected: format!("one ({})", FileRole::ControlPoints.endings()),
     })?;
     Ok((file.name.clone(), read_points(file, reading, warnings)?))
 }
@@ -151,8 +150,7 @@ fn read_points(
     reading: session::Options,
     warnings: &mut Vec<String>,
 ) -> Result<PointTrajectories, InputError> {
-    let format =
-        PointsFormat::from_name(&file.name).ok_or_else(|| kind_error(file, "a CSV, TRC or C3D file"))?;
+    let format = PointsFormat::from_name(&file.name).ok_or_else(|| kind_error(file))?;
     let read = format.read(&file.bytes, &reading);
     Ok(note(read.map_err(|source| InputError::File { file: file.name.clone(), source })?, file, warnings))
 }
@@ -167,11 +165,11 @@ fn at_most_one(files: &[NamedBytes], role: FileRole) -> Result<Option<&NamedByte
     if found.len() > 1 {
         let names = found.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
         let names = format!(" ({names})");
-        return Err(InputError::Count { role, found: found.len(), names, expected: "one" });
+        return Err(InputError::Count { role, found: found.len(), names, expected: "one".to_owned() });
     }
     Ok(found.first().copied())
 }
 
-fn kind_error(file: &NamedBytes, expected: &'static str) -> InputError {
-    InputError::Kind { file: file.name.clone(), role: file.role, expected }
+fn kind_error(file: &NamedBytes) -> InputError {
+    InputError::Kind { file: file.name.clone(), role: file.role }
 }

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use anyhow::{Context, bail};
-use formats::{PointsOptions, points_csv};
+use formats::session::{self, Options};
 use model::PointTrajectories;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -52,18 +52,14 @@ pub struct JointRow {
 pub fn read_truth(path: &Path) -> anyhow::Result<PointTrajectories> {
     let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let options = PointsOptions::default();
-    let read = match name.rsplit_once('.').map_or("", |(_, ending)| ending) {
-        "json" => return from_json(&bytes).with_context(|| path.display().to_string()),
-        "csv" => points_csv::read_with(&bytes, &options),
-        "trc" => formats::trc::read(&bytes, &options),
-        "c3d" => formats::c3d::read(&bytes, &options),
-        _ => bail!(
-            "{}: the run has joints of a body; expected true joints as .json (of `marey sample-capture`), .csv, .trc or .c3d",
-            path.display()
-        ),
-    };
-    Ok(read.with_context(|| path.display().to_string())?.value)
+    if name.ends_with(".json") {
+        return from_json(&bytes).with_context(|| path.display().to_string());
+    }
+    let read = session::read_points(&name, &bytes, &Options::default());
+    let read = read.with_context(|| {
+        format!("{}: true joints, .json of `marey sample-capture` or a file of points", path.display())
+    });
+    Ok(read?.value)
 }
 
 fn from_json(bytes: &[u8]) -> anyhow::Result<PointTrajectories> {

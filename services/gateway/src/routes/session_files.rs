@@ -78,10 +78,8 @@ pub(super) async fn put(
     })?;
     if !role.fits_session_file(&name) {
         return Err(Error::Unprocessable(format!(
-            "{name:?} can't have role {}: expected .csv, .trc or .c3d for control-points, .asf or .bvh for skeleton, \
-             .amc or .bvh for ground-truth, .toml, .json, .yml, .xml or .qca.txt for calibration, .mp4, .mov, .avi, .mkv or \
-             .webm for video, an archive for images and masks, a .png, a .jpg or an archive for plate",
-            role.as_str()
+            "{name:?} can't have role {role}: expected {}",
+            role.endings()
         )));
     }
     let announced = Announced::read(&headers)?;

@@ -109,9 +109,10 @@ impl SessionRun for InverseKinematicsRun {
     async fn plan(self, db: &mut PgConnection, project_id: Uuid, on: OnSession) -> Result<NewRun> {
         let solver = self.inverse_kinematics.solver_for(&on)?;
         if !on.has(FileRole::ControlPoints) {
-            return Err(Error::Unprocessable(
-                "the session has no measured points; upload a .csv, .trc or .c3d file first".into(),
-            ));
+            return Err(Error::Unprocessable(format!(
+                "the session has no measured points; upload a {} file first",
+                FileRole::ControlPoints.endings()
+            )));
         }
         let choice = self.markers.into();
         let how = InverseKinematics { choice, ..self.inverse_kinematics.resolve(solver) };

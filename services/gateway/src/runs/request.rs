@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use formats::FileRole;
 use serde::{Deserialize, Deserializer, de};
 use serde_json::{Map, Value};
 use sqlx::PgConnection;
@@ -78,11 +79,11 @@ fn implied(fields: &Map<String, Value>, on: &OnSession) -> Result<(&'static Kind
         [(kind, files)] => Ok((kind, format!("the session has {files}"))),
         // Without files, a field that only one kind requires tells what is meant.
         [] => required_by(is_given).ok_or_else(|| {
-            Error::Unprocessable(
-                "the session has neither control points nor cameras; upload a .csv, .trc or .c3d file, or a calibration and \
-                 what the cameras saw"
-                    .into(),
-            )
+            Error::Unprocessable(format!(
+                "the session has neither control points nor cameras; upload a {} file, or a calibration and what the \
+                 cameras saw",
+                FileRole::ControlPoints.endings()
+            ))
         }),
         ref several => {
             let files: Vec<&str> = several.iter().map(|(_, files)| *files).collect();

@@ -88,9 +88,10 @@ impl SessionRun for SparseRun {
             motion_database.gplvm = Some(versioned::gplvm(db, &database).await?);
         }
         if !on.has(FileRole::ControlPoints) {
-            return Err(Error::Unprocessable(
-                "the session has no control points; upload a .csv, .trc or .c3d file first".into(),
-            ));
+            return Err(Error::Unprocessable(format!(
+                "the session has no control points; upload a {} file first",
+                FileRole::ControlPoints.endings()
+            )));
         }
         let session_id = on.session.id;
         let mut choice = PointChoice::from(self.markers);

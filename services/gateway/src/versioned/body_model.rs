@@ -69,7 +69,6 @@ impl Versioned for BodyModel {
         runs: &[body_model::RUN_KIND],
         role: FileRole::Scans,
         takes: FileRole::is_scan_file,
-        takes_what: ".zip, .tar, .tar.gz, .tar.zst, .obj, .ply, .npy, rig.json or .csv",
         sources: "an archive of registered scans",
         input: store::key::body_model_input,
         prefix: store::key::body_model_prefix,

@@ -43,7 +43,7 @@ pub(crate) async fn put_file<V: Versioned>(
         return Err(Error::Unprocessable(format!(
             "{name:?} is not a file that a {} is built from: expected {}",
             V::NOUN.name,
-            V::NOUN.takes_what
+            V::NOUN.role.endings()
         )));
     }
     let announced = Announced::read(headers)?;

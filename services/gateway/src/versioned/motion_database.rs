@@ -100,7 +100,6 @@ impl Versioned for MotionDatabase {
         runs: &[motion_database::RUN_KIND, motion_database::TRAINING_RUN_KIND],
         role: FileRole::Motion,
         takes: FileRole::is_motion_file,
-        takes_what: ".zip, .tar, .tar.gz, .tar.zst, .asf, .amc or .bvh",
         sources: "an archive of ASF and AMC or of BVH files",
         input: store::key::motion_database_input,
         prefix: store::key::motion_database_prefix,

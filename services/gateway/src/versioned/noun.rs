@@ -33,8 +33,6 @@ pub(crate) struct Noun {
     pub role: FileRole,
     /// whether it can be built from a file of that name
     pub takes: fn(&str) -> bool,
-    /// the files that it can be built from, in words
-    pub takes_what: &'static str,
     /// what it is best built from
     pub sources: &'static str,
     /// where a file to build it from is stored, by its id and the file's

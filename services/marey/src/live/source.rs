@@ -2,8 +2,8 @@
 
 use std::{io::BufRead, path::Path, time::Instant};
 
-use anyhow::{Context, bail, ensure};
-use formats::PointsOptions;
+use anyhow::{Context, ensure};
+use formats::session::{self, Options};
 use model::{PointTrajectories, Samples};
 use nalgebra::Vector3;
 use tokio::sync::mpsc;
@@ -77,15 +77,8 @@ impl Source {
         }
         let name = || path.display().to_string();
         let bytes = std::fs::read(path).with_context(name)?;
-        let options = PointsOptions::default();
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        let read = match extension.as_str() {
-            "csv" => formats::points_csv::read_with(&bytes, &options),
-            "trc" => formats::trc::read(&bytes, &options),
-            "c3d" => formats::c3d::read(&bytes, &options),
-            _ => bail!("{} is no .csv, .trc or .c3d file", name()),
-        };
-        let trajectories = read.with_context(name)?.value;
+        let trajectories =
+            session::read_points(&name(), &bytes, &Options::default()).with_context(name)?.value;
         let ratio = trajectories.frame_rate() / FRAME_RATE;
         let step = ratio.round();
         ensure!(
