@@ -3,7 +3,7 @@
 #[non_exhaustive]
 pub enum Error {
     /// A number of control points without a set.
-    #[error("found no set of {found} control points, expected 2 to 6")]
+    #[error("{found} control points were asked for, expected 2 to 6")]
     Points {
         /// number asked for
         found: usize,

@@ -205,10 +205,7 @@ mod tests {
         assert_eq!(mapped.warnings, ["root: none of its markers is in the file"]);
         let wanted = ["root".to_owned()];
         let message = map.apply(&file(&["S:A"], &[0.0]), &wanted).unwrap_err().to_string();
-        assert_eq!(
-            message,
-            "control point root is made of nowhere, none of which is in the file; it has S:A"
-        );
+        assert_eq!(message, "none of the markers of control point root (nowhere) is in the file; it has S:A");
     }
 
     #[test]

@@ -118,9 +118,11 @@ pub fn detect(names: &[String]) -> Result<Fit<'static>> {
     let mut fits = fits(names);
     let Some(best) = fits.first().filter(|fit| fit.num_whole() >= MIN_POINTS).cloned() else {
         let nearest = fits.first().map(|fit| {
-            format!("{} comes nearest, with the markers of {} control points", fit.label(), fit.num_whole())
+            format!("the closest, {}, makes {} of the control points", fit.label(), fit.num_whole())
         });
-        return Err(Error::Unknown { nearest: nearest.unwrap_or_else(|| "none has any of them".to_owned()) });
+        return Err(Error::Unknown {
+            nearest: nearest.unwrap_or_else(|| "no set has any of them".to_owned()),
+        });
     };
     fits.retain(|fit| is_rival(fit, &best));
     if fits.is_empty() {

@@ -27,7 +27,7 @@ pub enum Error {
         known: String,
     },
     /// None of a control point's markers is in the file.
-    #[error("control point {point} is made of {markers}, none of which is in the file; it has {has}")]
+    #[error("none of the markers of control point {point} ({markers}) is in the file; it has {has}")]
     NoMarkers {
         /// the control point
         point: String,
@@ -47,7 +47,9 @@ pub enum Error {
         has: String,
     },
     /// A name of a map stands for several of the file.
-    #[error("marker {name} may be any of {found} in the file; choose one by a prefix or by its whole name")]
+    #[error(
+        "marker {name} could be any of {found} in the file; choose one by its prefix or by its full name"
+    )]
     Unclear {
         /// the marker's name in the map
         name: String,
@@ -56,14 +58,14 @@ pub enum Error {
     },
     /// The file's names belong to no preset.
     #[error(
-        "the file's markers belong to no known marker set ({nearest}); say what they are in a marker map, --map FILE"
+        "the file's markers match no known marker set ({nearest}); describe them in a marker map: --map FILE"
     )]
     Unknown {
         /// what came nearest
         nearest: String,
     },
     /// The file's names belong to several presets, or to several people.
-    #[error("the file's markers may be any of {candidates}; choose one")]
+    #[error("the file's markers could be any of {candidates}; choose one")]
     Ambiguous {
         /// presets and prefixes
         candidates: String,

@@ -69,7 +69,7 @@ pub enum Error {
     },
     /// What is seen is too small or too large for a person.
     #[error(
-        "what the cameras see is {height_m:.2} m high, expected a person of 0.5 to 2.8 m: is the calibration in metres?"
+        "what the cameras see is {height_m:.2} m tall, expected a person of 0.5 to 2.8 m: is the calibration in metres?"
     )]
     Height {
         /// of the visual hull, metres

@@ -29,7 +29,7 @@ pub enum Error {
         max: usize,
     },
     /// A control point asked for twice.
-    #[error("control point {name} is there twice, expected every point once")]
+    #[error("control point {name} is given twice, expected every point once")]
     PointTwice {
         /// its name
         name: String,

@@ -34,7 +34,7 @@ pub enum Error {
     },
     /// No place in space is seen by all cameras.
     #[error(
-        "no place is seen as the person by all but {tolerated} of {views} cameras: calibration and silhouettes don't fit"
+        "the silhouettes of the {views} cameras have no place in common, even if {tolerated} may disagree: calibration and silhouettes don't fit"
     )]
     EmptyHull {
         /// views that may disagree

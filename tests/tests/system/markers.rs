@@ -109,10 +109,10 @@ fn a_map_of_ones_own_says_what_unknown_markers_are() -> Result<()> {
         Ok(api.wait(&run)?["error"].as_str().unwrap_or_default().to_owned())
     };
     let unknown = fails(json!({"motion_database": "drawn"}))?;
-    assert!(unknown.contains("own.csv: the file's markers belong to no known marker set"), "{unknown}");
+    assert!(unknown.contains("own.csv: the file's markers match no known marker set"), "{unknown}");
     let lacking =
         fails(json!({"motion_database": "drawn", "marker_map": "[points]\nroot = 'P'\nhead = 'Q'\n"}))?;
-    assert!(lacking.contains("control point head is made of Q, none of which is in the file"), "{lacking}");
+    assert!(lacking.contains("none of the markers of control point head (Q) is in the file"), "{lacking}");
     Ok(())
 }
 
