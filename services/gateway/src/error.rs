@@ -103,7 +103,7 @@ impl Error {
             Self::Unprocessable(_) => (S::UNPROCESSABLE_ENTITY, "unprocessable", "The request can't be done"),
             Self::Conflict(_) => (S::CONFLICT, "conflict", "Not possible at present"),
             Self::UnsupportedMediaType(_) => {
-                (S::UNSUPPORTED_MEDIA_TYPE, "unsupported-media-type", "Media type not taken here")
+                (S::UNSUPPORTED_MEDIA_TYPE, "unsupported-media-type", "Media type not accepted here")
             }
             Self::TooLarge { .. } => (S::PAYLOAD_TOO_LARGE, "too-large", "Too large"),
             Self::ChecksumMismatch { .. } => {

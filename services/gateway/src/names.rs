@@ -22,7 +22,7 @@ pub(crate) fn check_file_name(name: &str) -> Result<()> {
     let plain = !name.starts_with('.') && !name.chars().any(|c| c.is_control() || matches!(c, '/' | '\\'));
     if length == 0 || length > MAX_NAME_CHARS || !plain {
         return Err(Error::Unprocessable(format!(
-            "file name {:?} is not one: expected 1 to {MAX_NAME_CHARS} characters without slashes that do not start \
+            "{:?} is not a valid file name: expected 1 to {MAX_NAME_CHARS} characters without slashes that do not start \
              with a dot",
             name.chars().take(80).collect::<String>()
         )));
@@ -39,7 +39,7 @@ pub(crate) fn check_versioned_name(what: &str, name: &str) -> Result<()> {
         && uuid::Uuid::parse_str(name).is_err();
     if !good {
         return Err(Error::Unprocessable(format!(
-            "{what} name {:?} is not one: expected 1 to 64 letters, digits, '.', '_' or '-', beginning with \
+            "{:?} is not a valid {what} name: expected 1 to 64 letters, digits, '.', '_' or '-', beginning with \
              a letter or digit",
             name.chars().take(80).collect::<String>()
         )));

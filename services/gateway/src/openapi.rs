@@ -65,7 +65,7 @@ pub(crate) fn finish(mut api: utoipa::openapi::OpenApi) -> utoipa::openapi::Open
 fn add_problem(operation: &mut Operation) {
     let content: Content = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();
     let problem: Response = ResponseBuilder::new()
-        .description("Not done: problem details (RFC 9457)")
+        .description("Failed: problem details (RFC 9457)")
         .content("application/problem+json", content)
         .build();
     operation.responses.responses.insert("default".to_owned(), RefOr::T(problem));

@@ -118,7 +118,7 @@ fn check(
                 }
                 Ok(None) => break,
                 Err(_) => {
-                    yield refuse(Error::UploadBroken(format!("nothing came for {} seconds", stall.as_secs())));
+                    yield refuse(Error::UploadBroken(format!("nothing arrived for {} seconds", stall.as_secs())));
                     return;
                 }
             }

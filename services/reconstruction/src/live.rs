@@ -65,7 +65,8 @@ impl live_server::Live for LiveRpc {
         let slot = self.slot()?;
         let mut requests = request.into_inner();
         let first = tokio::time::timeout(START_WAIT, requests.message()).await;
-        let first = first.map_err(|_| Status::deadline_exceeded("no start came within 10 seconds"))??;
+        let first =
+            first.map_err(|_| Status::deadline_exceeded("no start message arrived within 10 seconds"))??;
         let Some(live_request::Message::Start(start)) = first.and_then(|first| first.message) else {
             return Err(Status::invalid_argument("the first message is not a start"));
         };

@@ -100,7 +100,7 @@ async fn open(
         first = timeout(START_WAIT, next_message(stream)) => first,
         () = live.shutdown.cancelled() => return Err(End::new(close_code::AWAY, "the server is shutting down")),
     };
-    let first = first.map_err(|_| policy("no start came within 10 seconds".to_owned()))?;
+    let first = first.map_err(|_| policy("no start message arrived within 10 seconds".to_owned()))?;
     let start: Start = match first {
         Some(Message::Text(text)) => match messages::read_text(&text)? {
             FromClient::Start(start) => start,

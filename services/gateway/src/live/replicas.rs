@@ -66,7 +66,7 @@ impl Replicas {
         for address in self.addresses().await {
             match follow_on(address, start.clone()).await {
                 Err(status) if matches!(status.code(), Code::ResourceExhausted | Code::Unavailable) => {
-                    tracing::debug!(%address, %status, "a reconstruction service takes no stream");
+                    tracing::debug!(%address, %status, "a reconstruction service refuses the stream");
                     // "full" says more than "away"
                     if last.code() != Code::ResourceExhausted {
                         last = status;

@@ -73,7 +73,7 @@ pub(super) async fn put(
     names::check_file_name(&name)?;
     let role = query.role.or_else(|| FileRole::from_session_file(&name)).ok_or_else(|| {
         Error::Unprocessable(format!(
-            "the role of {name:?} can't be told from its name; give it: --role in `marey upload`, ?role= in a request"
+            "the role of {name:?} can't be told from its name; state it: --role in `marey upload`, ?role= in a request"
         ))
     })?;
     if !role.fits_session_file(&name) {

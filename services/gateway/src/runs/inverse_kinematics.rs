@@ -121,8 +121,8 @@ impl SessionRun for InverseKinematicsRun {
             && let Some(field) = self.cameras.first_given()?
         {
             return Err(Error::Unprocessable(format!(
-                "{field} is for runs that look at cameras, and this one looks at none; upload a calibration and what they \
-                 saw, or leave it out"
+                "{field} is for runs that use cameras, and this one uses none; upload a calibration and what the cameras \
+                 saw, or leave {field} out"
             )));
         }
         let body_model = cameras::body_model(db, project_id, self.body_model.as_deref()).await?;

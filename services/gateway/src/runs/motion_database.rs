@@ -96,7 +96,7 @@ impl NewBuild {
         let expected = versioned::augment(db, base.id()).await?;
         match &self.augment {
             Some(found) if *found != expected => Err(Error::Unprocessable(format!(
-                "augment is not that of {}, which this one begins with; leave it out, or build a database of all files",
+                "augment differs from that of {}, which this one extends; leave it out, or build a database from all the files",
                 base.title()
             ))),
             _ => Ok(expected),

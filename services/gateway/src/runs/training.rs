@@ -36,7 +36,7 @@ impl NewTraining {
         let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
         if let Some(method) = self.method.as_ref().filter(|method| *method != "gplvm") {
             return Err(Error::Unprocessable(format!(
-                "method is {method:?}, expected \"gplvm\": no other needs a model"
+                "method is {method:?}, expected \"gplvm\": no other method needs a model"
             )));
         }
         let given = Value::Object(self.parameters.clone());

@@ -114,7 +114,7 @@ impl Versioned for MotionDatabase {
     fn check(new: &NewMotionDatabase) -> Result<&str> {
         if new.base.is_none() && !new.without.is_empty() {
             return Err(Error::Unprocessable(
-                "without names clips of base, but base is missing; add it, or leave without out".into(),
+                "`without` lists clips to leave out of `base`, and no base is given; give it, or drop `without`".into(),
             ));
         }
         if new.without.len() > MAX_WITHOUT {

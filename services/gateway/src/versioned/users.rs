@@ -31,7 +31,7 @@ impl fmt::Display for User {
         match (self.run_id, &self.session, &self.motion_database) {
             (Some(run), Some(session), _) => write!(f, "run {run} of session {session:?}"),
             (Some(run), None, _) => write!(f, "run {run}"),
-            (None, _, Some(version)) => write!(f, "{version}, which is to be made from it"),
+            (None, _, Some(version)) => write!(f, "{version}, which is being made from it"),
             (None, _, None) => f.write_str("another version"),
         }
     }
