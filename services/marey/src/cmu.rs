@@ -82,7 +82,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if refused.is_empty() {
         Ok(())
     } else {
-        bail!("{} could not be had:\n{}", counted(refused.len() as u64, "file"), refused.join("\n"))
+        bail!("{} could not be downloaded:\n{}", counted(refused.len() as u64, "file"), refused.join("\n"))
     }
 }
 
@@ -138,7 +138,7 @@ impl Subject<'_> {
                         break;
                     }
                 }
-                None => outcome.refused.push(format!("{}/{name} is not there", self.url)),
+                None => outcome.refused.push(format!("{}/{name} does not exist", self.url)),
             }
         }
         Ok(outcome)

@@ -6,7 +6,7 @@ use anyhow::bail;
 use client::{Client, MotionDatabase, Run, ServerArgs, encode};
 use serde_json::{Map, Value, json};
 
-use crate::{database_show, pack, watch};
+use crate::{database_show, pack, watch, words::counted};
 
 /// `marey db …`
 #[derive(Debug, clap::Subcommand)]
@@ -48,7 +48,7 @@ pub struct BuildArgs {
     /// Archives (zip, tar, tar.gz, tar.zst), folders, or ASF, AMC and BVH files
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// More motion to make of the recordings: mirror (left and right exchanged), warp (at 0.8 and 1.25 times the speed) or
+    /// More motion to make from the recordings: mirror (left and right exchanged), warp (at 0.8 and 1.25 times the speed) or
     /// warp=SPEED; mirror,warp makes about six times as much
     #[arg(long, value_delimiter = ',', value_name = "WAYS")]
     augment: Vec<Augmentation>,
@@ -58,8 +58,8 @@ pub struct BuildArgs {
 
 /// Make a new version of a motion database: with more recordings, or without some clips
 ///
-/// The version before stays as it is, and can be deleted. What was made of its recordings (see `marey db build --augment`) is
-/// made of the new ones too.
+/// The version before stays as it is, and can be deleted. New recordings are mirrored and warped as those
+/// of that version were (see `marey db build --augment`).
 #[derive(Debug, clap::Args)]
 pub struct AddArgs {
     /// The database to add to: NAME (its latest version that is ready), NAME@VERSION, or its id
@@ -68,7 +68,7 @@ pub struct AddArgs {
     /// Archives (zip, tar, tar.gz, tar.zst), folders, or ASF, AMC and BVH files
     #[arg(required_unless_present = "without")]
     files: Vec<PathBuf>,
-    /// Clips to leave out, by name (see `marey db show NAME --clips`), with all that was made of them
+    /// Clips to leave out, by name (see `marey db show NAME --clips`), with everything made from them
     #[arg(long, value_delimiter = ',', value_name = "CLIPS")]
     without: Vec<String>,
     #[command(flatten)]
@@ -188,9 +188,9 @@ impl BuildOptions {
             watch::until_end(client, &run.id)?;
             let database: MotionDatabase = client.get(&format!("/v1/motion-databases/{}", database.id))?;
             println!(
-                "ready: {} poses of {} clips",
-                database.num_poses.unwrap_or_default(),
-                database.num_clips.unwrap_or_default()
+                "ready: {} of {}",
+                counted(database.num_poses.unwrap_or_default(), "pose"),
+                counted(database.num_clips.unwrap_or_default(), "clip")
             );
         }
         Ok(())

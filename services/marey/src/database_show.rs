@@ -5,6 +5,8 @@ use std::fmt::Write;
 use client::MotionDatabase;
 use serde::Deserialize;
 
+use crate::words::counted;
+
 /// A motion database and what is in it.
 #[derive(Debug, Deserialize)]
 pub struct Details {
@@ -102,14 +104,17 @@ pub fn description(details: &Details) -> String {
     }
     if let Some(contents) = &details.contents {
         let skeleton = details.skeleton.clone().unwrap_or_default();
-        line("skeleton", format!("{skeleton}, {} joints, {} DOFs", contents.num_joints, contents.num_dofs));
+        line(
+            "skeleton",
+            format!("{skeleton}, {} joints, {} degrees of freedom", contents.num_joints, contents.num_dofs),
+        );
         let (clips, poses) = (details.database.num_clips, details.database.num_poses);
         line(
             "motion",
             format!(
-                "{} clips, {} poses at {} Hz",
-                clips.unwrap_or_default(),
-                poses.unwrap_or_default(),
+                "{}, {} at {} Hz",
+                counted(clips.unwrap_or_default(), "clip"),
+                counted(poses.unwrap_or_default(), "pose"),
                 contents.frame_rate_hz
             ),
         );
@@ -141,7 +146,7 @@ impl User {
             (Some(run), Some(session), _) => format!("run {run} of session {session:?}"),
             (Some(run), None, _) => format!("run {run}"),
             (None, _, version) => {
-                format!("{}, which is to be made from it", version.as_deref().unwrap_or_default())
+                format!("{}, which is being made from it", version.as_deref().unwrap_or_default())
             }
         }
     }

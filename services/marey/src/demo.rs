@@ -43,7 +43,7 @@ const NUM_SAMPLES: u32 = 160;
 ///
 /// Starts everything, learns from recordings, and reconstructs others from 4 and from 6 of their points; then follows a
 /// synthetic person through the silhouettes of six cameras. Ends with how far the results are from the truth, beside a plain
-/// baseline, and where to look. Without --data, all motion is synthetic. Takes about a minute; nothing that is there is
+/// baseline, and where to look. Without --data, all motion is synthetic. Takes about a minute; no existing file is
 /// overwritten.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -53,10 +53,10 @@ pub struct Args {
     /// Folder with recordings: ASF and AMC, or BVH, also .zst or .gz
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// New folder for the results [default: marey-demo, or marey-demo-2 and so on if that is there]
+    /// New folder for the results [default: marey-demo, or marey-demo-2 and so on if that exists]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Leave the server running when all is shown, until Ctrl-C
+    /// Leave the server running at the end, until Ctrl-C
     #[arg(long)]
     keep: bool,
 }

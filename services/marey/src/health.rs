@@ -12,7 +12,7 @@ use crate::serve::runtime;
 /// An answer that takes longer is none.
 const TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Ask a service whether it is healthy; for probes of containers
+/// Ask a service whether it is healthy; for health checks of containers
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey health http://127.0.0.1:8080         # the gateway: asks /readyz

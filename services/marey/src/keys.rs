@@ -36,7 +36,7 @@ pub struct CreateArgs {
     /// What the key allows: read, write, admin
     #[arg(long, value_delimiter = ',', default_value = "read,write")]
     scopes: Vec<Scope>,
-    /// What you will know the key by
+    /// Label to recognise the key by
     #[arg(long, default_value = "")]
     name: String,
     /// PostgreSQL, such as postgres://user:password@host/name

@@ -134,7 +134,7 @@ fn show(map: &MarkerMap, file: &PointTrajectories) -> anyhow::Result<()> {
 
 fn write(to: &Path, file: &PointTrajectories, fit: Option<&Fit<'_>>) -> anyhow::Result<()> {
     if to.exists() {
-        bail!("{} is there already; remove it or write another", to.display());
+        bail!("{} exists already; remove it or choose another name", to.display());
     }
     fs::write(to, markers::template(file.names(), fit)).with_context(|| to.display().to_string())?;
     println!(

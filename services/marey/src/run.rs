@@ -83,10 +83,10 @@ struct SparseArgs {
     /// local-regression, nearest, lpca, lpcr or gplvm [default: local-regression]; see docs/methods.md
     #[arg(long)]
     method: Option<String>,
-    /// Last poses that are compared with the recordings [default: 2]
+    /// How many of the latest poses are compared with the recordings [default: 2]
     #[arg(long, value_name = "FRAMES")]
     window: Option<u32>,
-    /// Moments of the recordings that each frame is learned from, the most similar ones [default: 64]
+    /// How many moments of the recordings, the most similar ones, each frame is learned from [default: 64]
     #[arg(long, value_name = "NUMBER")]
     neighbours: Option<u32>,
     /// Length of one unit of BVH files, in metres [default: 0.01, centimetres]
@@ -124,10 +124,10 @@ struct InverseKinematicsArgs {
     /// with cameras, otherwise priority]
     #[arg(long)]
     solver: Option<String>,
-    /// Most steps for each frame [default: 15]
+    /// Largest number of steps for each frame [default: 15]
     #[arg(long)]
     steps: Option<u32>,
-    /// Frames to solve a second [default: as many as the cameras have, otherwise as the file of points]
+    /// Frames per second to solve [default: those of the cameras, otherwise those of the file of points]
     #[arg(long, value_name = "HZ")]
     frame_rate: Option<f64>,
     /// The person's stature in metres

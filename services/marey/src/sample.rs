@@ -32,7 +32,7 @@ pub struct Args {
     /// How many trials
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     count: u32,
-    /// Another seed draws other trials, the same seed the same ones
+    /// A different seed draws different trials; the same seed draws the same ones
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// walk, run, jump or boxing [default: all in turn]
@@ -135,7 +135,7 @@ impl Index {
         let header = lines.next().unwrap_or(Self::HEADER);
         anyhow::ensure!(
             header == Self::HEADER,
-            "{} is not of drawn trials: it begins with {header:?}; choose another folder",
+            "{} does not list synthetic trials: it begins with {header:?}; choose another folder",
             path.display()
         );
         let row = |line: &str| Some((line.split_once(',')?.0.to_owned(), line.to_owned()));

@@ -31,8 +31,8 @@ const STATURES_M: [f64; 5] = [1.58, 1.66, 1.73, 1.79, 1.86];
 
 /// Write a synthetic multi-camera capture to try things with
 ///
-/// A body of the shipped model moves as in a drawn trial, inside a ring of cameras. Written are the calibration, a silhouette for
-/// each frame and camera, and the true joints and meshes. It is synthetic: the body is one that the model knows, and its
+/// A body of the shipped model moves as in a drawn trial, inside a ring of cameras. The calibration, a silhouette for each frame
+/// and camera, and the true joints and meshes are written. All of it is synthetic: the body is one that the model knows, and its
 /// silhouettes are exact.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -52,7 +52,7 @@ pub struct Args {
     /// walk, run, jump or boxing
     #[arg(long, default_value = "walk")]
     action: Action,
-    /// Another seed draws another person and motion, the same seed the same ones
+    /// A different seed draws a different person and motion; the same seed draws the same ones
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }

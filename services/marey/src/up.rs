@@ -26,7 +26,7 @@ const GRACE: Duration = Duration::from_secs(5);
 /// Start everything on this machine
 ///
 /// PostgreSQL, the HTTP interface and the services that do the work, in one process. Everything is kept in the data folder:
-/// when you start it again, all is there again. Ctrl-C stops it. It can be reached from this machine alone, unless --listen says
+/// when you start it again, all of it is still there. Ctrl-C stops it. Only this machine can reach it, unless --listen says
 /// otherwise.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Examples:

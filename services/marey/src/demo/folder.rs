@@ -14,7 +14,7 @@ pub fn new_folder(asked: Option<&Path>, name: &str) -> anyhow::Result<PathBuf> {
     if let Some(folder) = asked {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         if fs::read_dir(folder).with_context(|| folder.display().to_string())?.next().is_some() {
-            bail!("{} is not empty; name a new folder", folder.display());
+            bail!("{} is not empty; choose a new folder", folder.display());
         }
         return Ok(folder.to_owned());
     }
