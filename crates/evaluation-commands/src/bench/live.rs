@@ -24,7 +24,7 @@ const POINTS: [&str; 6] = ["left_wrist", "right_wrist", "left_ankle", "right_ank
 /// How long a server may take to start.
 const START_WAIT: Duration = Duration::from_secs(60);
 
-/// Latency of live streams, gateway included
+/// Measure the latency of live streams, gateway included
 ///
 /// Streams control points over WebSockets, as many performers at once would send them, and times every frame from being
 /// sent to having its pose. Starts are part of it. Without --database a server is started as a process of its own, on a
@@ -53,10 +53,10 @@ pub struct Args {
     /// Folders of motion that is streamed; trials follow one another without a pause, so that performers jump
     #[arg(long, num_args = 1.., value_name = "DIR")]
     test: Vec<PathBuf>,
-    /// Use this database of a server that runs
+    /// Use this database, on a running server
     #[arg(long)]
     database: Option<String>,
-    /// Parameter of the method: NAME=VALUE; may be given often
+    /// Parameter of the method: NAME=VALUE; may be given several times
     #[arg(long = "set", value_name = "NAME=VALUE")]
     parameters: Vec<String>,
     /// Send the frames of all streams at the same moment, instead of evenly spread

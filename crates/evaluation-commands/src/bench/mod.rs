@@ -14,7 +14,7 @@ pub struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum What {
     Reconstruct(Box<reconstruct::Args>),
-    /// Search windows of held-out motion in a database: exact beside fast
+    /// Search windows of held-out motion in a database: compare exact with fast search
     Search(Box<search::Args>),
     Live(Box<live::Args>),
 }

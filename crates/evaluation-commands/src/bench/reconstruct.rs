@@ -27,7 +27,7 @@ const PARTS: [(&str, FramePart); 5] = [
     ("rest", FramePart::Rest),
 ];
 
-/// Time a whole frame of reconstruction takes on one thread, and its parts
+/// Measure how long one frame of a reconstruction takes on one thread, and each part of it
 ///
 /// Trials of the query folders are reconstructed from their own control points with a database of the training folders, from
 /// which the trial itself is left out. Frames on which a start was sought are counted apart from steady ones.
@@ -62,7 +62,7 @@ pub struct Args {
     /// Only the first frames of each trial, at 60 a second
     #[arg(long, default_value_t = 120)]
     frames: usize,
-    /// At most so many trials, evenly spread over their names
+    /// At most this many trials, spread evenly over their names
     #[arg(long, default_value_t = 24)]
     trials: usize,
     /// Write the numbers to this file

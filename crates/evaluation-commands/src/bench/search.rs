@@ -35,7 +35,7 @@ pub struct Args {
     /// Folders of motion for the database: ASF+AMC or BVH, also .zst
     #[arg(long, required = true, num_args = 1.., value_name = "DIR")]
     train: Vec<PathBuf>,
-    /// Folders of motion that asks; its performers are left out of the database
+    /// Folders of motion to search for; its performers are left out of the database
     #[arg(long, required = true, num_args = 1.., value_name = "DIR")]
     query: Vec<PathBuf>,
     /// More motion for the database: left and right exchanged, 0.8 and 1.25 times as fast
@@ -47,7 +47,7 @@ pub struct Args {
     /// Number of nearest windows K
     #[arg(long, default_value_t = 64, value_name = "K")]
     neighbours: usize,
-    /// Frames of each trial that ask, from its middle
+    /// Frames of each trial to search for, from its middle
     #[arg(long, default_value_t = 60)]
     frames: usize,
     /// Keep the index file here
@@ -160,7 +160,9 @@ fn database(args: &Args, performers: &HashSet<&str>) -> anyhow::Result<MotionDat
     let mut clips: Vec<Clip> = motions::read(&args.train)?;
     clips.retain(|clip| !performers.contains(clip.subject.as_str()));
     if clips.is_empty() {
-        bail!("the training folders hold nobody but the performers of the query folders");
+        bail!(
+            "all performers of the training folders are in the query folders too, so nobody is left to learn from"
+        );
     }
     let recorded = MotionDatabase::build(&clips)?;
     if augment == Augment::default() {

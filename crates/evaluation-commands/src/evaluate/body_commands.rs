@@ -171,7 +171,7 @@ pub fn feet(args: &Args) -> anyhow::Result<()> {
 
 fn names(points: usize) -> anyhow::Result<&'static [&'static str]> {
     ControlSet::names(points)
-        .with_context(|| format!("found no set of {points} control points, expected 2 to 6"))
+        .with_context(|| format!("{points} control points were asked for, expected 2 to 6"))
 }
 
 fn write(args: &Args, results: &impl Serialize) -> anyhow::Result<()> {

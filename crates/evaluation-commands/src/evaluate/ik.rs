@@ -18,8 +18,9 @@ use crate::{motions, progress::Progress};
 /// `marey evaluate ik`
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Motion drives the body model, which is drawn into two cameras. Arms of boxers and legs of walkers are told where their \
-shoulders and wrists, or hips and ankles, are, and the silhouettes; the elbows and knees found are compared with the true ones.
+Motion drives the body model, which is drawn into two cameras. For arms of boxers and legs of walkers the \
+solver is given the shoulders and wrists, or hips and ankles, and the silhouettes; the elbows and knees found are compared with \
+the true ones.
 
 Motion must be on the CMU skeleton, ASF+AMC or BVH, also .zst; the skeleton of an AMC file is looked for beside it. Without any, \
 motion is drawn from the sample motion that comes with Marey: it is synthetic.
@@ -286,7 +287,9 @@ fn print(json: &Json) {
         println!("{action}: {frames} frames of {}", names.join(" "));
     }
     if json.synthetic {
-        println!("\nThe motion is synthetic: it says nothing about recorded motion, nor beside the paper.");
+        println!(
+            "\nThe motion is synthetic: its figures say nothing of recorded motion, and don't compare with the paper."
+        );
     } else {
         let tuned_on = TUNED_ON.join(" and ");
         println!("\nThe paper's figures are of HumanEva. Widths and weights were tuned on {tuned_on}.");

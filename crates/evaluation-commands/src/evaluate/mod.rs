@@ -25,11 +25,11 @@ pub struct Args {
 enum What {
     /// Reconstruct recorded motion from a few of its own points, and compare
     Sparse(Box<sparse_command::Args>),
-    /// Fit skeletons to performers whose own is not given, and compare
+    /// Fit skeletons to performers as if theirs were not known, and compare
     Skeleton(body_commands::Args),
     /// Hold standing feet in reconstructed motion, and compare
     Feet(body_commands::Args),
-    /// Compare what a run has made with the motion that really was
+    /// Compare the motion that a run found with the true motion
     Run(run_command::Args),
     /// Find elbows and knees of moving limbs by inverse kinematics, with and without silhouettes, and compare
     Ik(ik::Args),

@@ -32,7 +32,7 @@ use texture::Texture;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png and groundtruth/joints.json; images/CAMERA/0000.jpg, where \
-there are any, show points of the person that are found again, and are the ground of the overlays. The body's shape and its first pose are found in the first frame, without a start given; \
+there are any, show points of the person that are found again, and are the background of the overlays. The body's shape and its first pose are found in the first frame, without a start given; \
 then it is followed from frame to frame.
 
 Joints are compared by name. Beside the result stand two that need less: local optimisation without particles, and the first pose kept \
@@ -49,13 +49,14 @@ pub struct Args {
     /// Only these cameras: their names, or their numbers from 0 [default: all]
     #[arg(long, value_delimiter = ',', value_name = "CAMERA")]
     cameras: Vec<String>,
-    /// Turn over 1.2 % of the pixels and add blobs and holes, with this seed
+    /// Flip 1.2 % of the pixels and add blobs and holes, with this seed
     #[arg(long, value_name = "SEED", num_args = 0..=1, default_missing_value = "1")]
     noise: Option<u64>,
     /// Use silhouettes alone, even where there are pictures
     #[arg(long)]
     no_texture: bool,
-    /// Make the prior of particles of these recordings: ASF+AMC of the CMU skeleton, also .zst or .gz [default: built-in poses]
+    /// Learn the prior of the particle search from these recordings: ASF+AMC of the CMU skeleton, also .zst or .gz [default:
+    /// built-in poses]
     #[arg(long, num_args = 1.., value_name = "DIR")]
     prior_from: Vec<PathBuf>,
     /// A body model to use instead of the one that comes with Marey
@@ -64,10 +65,10 @@ pub struct Args {
     /// Only the first frames
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
-    /// Another seed gives other particles, the same seed the same
+    /// A different seed gives different particles; the same seed gives the same
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Measure how long a particle search takes in every so manyth frame, without using what it finds; 0 for none
+    /// Measure how long a particle search takes in every N-th frame, without using what it finds; 0 for none
     #[arg(long, value_name = "N", default_value_t = 8)]
     time_search_every: usize,
     /// Write the errors to this file
@@ -88,7 +89,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut frames = folder.frames();
     frames.truncate(args.frames.unwrap_or(usize::MAX));
     let Some(&first) = frames.first() else {
-        bail!("found no frame that all cameras have a silhouette of in {}", args.folder.display());
+        bail!("found no frame with a silhouette of every camera in {}", args.folder.display());
     };
     let training = prior(&model, &args.prior_from)?;
     let joints = Joints::new(&model, &folder.joints(first)?)?;

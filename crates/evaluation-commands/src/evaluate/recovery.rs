@@ -42,7 +42,7 @@ pub struct Args {
     /// Whose poses the bodies have
     #[arg(long, value_enum, default_value_t = Part::Report)]
     part: Part,
-    /// Turn limbs by so much in each angle, degrees
+    /// How far limbs are turned in each angle, degrees
     #[arg(long, value_delimiter = ',', default_value = "10,20,40", value_name = "DEGREES")]
     turned: Vec<f64>,
     /// Which limbs are turned
@@ -54,10 +54,10 @@ pub struct Args {
     /// Cameras in a ring
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(2..=16))]
     cameras: u32,
-    /// Turn over 1.2 % of the pixels and add blobs and holes
+    /// Flip 1.2 % of the pixels and add blobs and holes
     #[arg(long)]
     noise: bool,
-    /// Another seed gives other bodies and other particles, the same seed the same
+    /// A different seed gives different bodies and particles; the same seed gives the same
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Write the distances of every start to this file

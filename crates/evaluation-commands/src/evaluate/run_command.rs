@@ -90,9 +90,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match run.kind.as_str() {
         "reconstruction" => {}
         "multi-view" | "inverse-kinematics" => return joints(args, &downloads, &run),
-        kind => bail!("run {} is of kind {kind}: it makes no motion", run.id),
+        kind => bail!("run {} is of kind {kind}, which produces no motion", run.id),
     }
-    let session = run.session_id.as_deref().context("the run's session is not there any more")?;
+    let session = run.session_id.as_deref().context("the run's session has been deleted")?;
     let files = inputs(args, &downloads, session)?;
     let Some(truth) = only(&files, FileRole::GroundTruth)? else {
         bail!(
@@ -110,9 +110,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let truth = true_motion(truth, only(&files, FileRole::Skeleton)?, &found, &reading)?;
     if !truth.skeleton().same_structure(found.skeleton()) {
-        bail!(
-            "{name} is on a skeleton of other joints than the result, expected the same: they can't be compared"
-        );
+        bail!("the joints of {name} are not those of the result, so they can't be compared");
     }
     let rest = References::rest(truth.skeleton());
     let truth = at_60_hz(&Parametrisation::smooth(truth.skeleton(), &rest)?, &truth, usize::MAX)?;
@@ -121,10 +119,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         .zip(FootPaths::from_motion(&found))
         .and_then(|(truth, found)| foot_slide(&truth, &found, &ContactThresholds::default()));
     let table = run_errors(&comparison, slide.as_ref());
-    println!("run {} beside {name}\n{}", run.id, table.text().trim_end());
+    println!("run {} compared with {name}\n{}", run.id, table.text().trim_end());
     if truth.num_frames() != found.num_frames() {
         println!(
-            "the truth has {} frames at 60 a second, the result {}: those that both have were compared",
+            "the truth has {} frames at 60 a second, the result {}: the frames that both have were compared",
             truth.num_frames(),
             found.num_frames()
         );
@@ -143,7 +141,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 fn joints(args: &Args, downloads: &Downloads<'_>, run: &Run) -> anyhow::Result<()> {
     let Some(path) = &args.truth else {
         bail!(
-            "run {} is of kind {}: name the true joints, --truth FILE (.json of `marey sample-capture`, .csv, .trc or .c3d)",
+            "run {} is of kind {}: give the true joints by --truth FILE (.json of `marey sample-capture`, .csv, .trc or .c3d)",
             run.id,
             run.kind
         );
@@ -156,7 +154,7 @@ fn joints(args: &Args, downloads: &Downloads<'_>, run: &Run) -> anyhow::Result<(
     let first = run.parameters["parameters"]["first_frame"].as_u64().unwrap_or(0) as usize;
     let report = run_joints::compare(&found, &truth, first)?;
     println!(
-        "run {} beside {}, {} frames\n{}",
+        "run {} compared with {}, {} frames\n{}",
         run.id,
         path.display(),
         report.frames,
@@ -231,7 +229,7 @@ fn about(run: &Run, truth: &str) -> About {
     let parameters = run.parameters["parameters"].as_object().into_iter().flatten();
     About {
         title: format!("Run {}", run.id),
-        introduction: format!("A reconstructed motion beside the true one, {truth}."),
+        introduction: format!("A reconstructed motion compared with the true one, {truth}."),
         facts: vec![
             ("session".to_owned(), word(&run.parameters["session_name"])),
             ("motion database".to_owned(), word(&run.parameters["motion_database"]["name"])),

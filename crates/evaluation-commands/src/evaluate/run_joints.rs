@@ -101,7 +101,7 @@ pub fn compare(
     }
     if joints.is_empty() {
         bail!(
-            "no joint is known to both: the result has {}, the truth {}",
+            "the result and the truth have no joint names in common: the result has {}, the truth {}",
             found.names().join(", "),
             truth.names().join(", ")
         );

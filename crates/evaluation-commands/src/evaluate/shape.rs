@@ -28,7 +28,7 @@ use super::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png, groundtruth/mesh_0000.ply and groundtruth/joints.json; \
-images/CAMERA/0000.jpg, where there are any, are the ground of the overlays.
+images/CAMERA/0000.jpg, where there are any, are the background of the overlays.
 
 With --scans, people whose registered scans are known are drawn as 8 cameras would see them, and found again by a model that was \
 learned without them: in the base pose and in 5 others.
@@ -44,7 +44,7 @@ pub struct Args {
     /// Only these cameras: their names, or their numbers from 0 [default: all]
     #[arg(long, value_delimiter = ',', value_name = "CAMERA")]
     cameras: Vec<String>,
-    /// Turn over 1.2 % of the pixels and add blobs and holes, with this seed
+    /// Flip 1.2 % of the pixels and add blobs and holes, with this seed
     #[arg(long, value_name = "SEED", num_args = 0..=1, default_missing_value = "1")]
     noise: Option<u64>,
     /// A body model to use instead of the one that comes with Marey
@@ -59,7 +59,7 @@ pub struct Args {
     /// Write a picture for each camera, with the outline of the body found, to this folder
     #[arg(long, value_name = "DIR", conflicts_with = "scans")]
     overlay: Option<PathBuf>,
-    /// Folder of registered scans: vertices.npy, faces.npy, joints.npy and scans.csv, with rig.json, skin_joints.npy and \
+    /// Folder of registered scans: vertices.npy, faces.npy, joints.npy and scans.csv, with rig.json, skin_joints.npy and
     /// skin_weights.npy there or in ../rig
     #[arg(long, value_name = "DIR")]
     scans: Option<PathBuf>,
@@ -90,9 +90,9 @@ struct CameraJson<'a> {
 /// Runs `marey evaluate shape`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let Some(folder) = &args.folder else {
-        let Some(scans) = &args.scans else { bail!("found neither DIR nor --scans, expected one of them") };
+        let Some(scans) = &args.scans else { bail!("give either DIR or --scans") };
         if !args.cameras.is_empty() || args.frame != 0 {
-            bail!("--cameras and --frame choose from a capture, expected DIR with them rather than --scans");
+            bail!("--cameras and --frame are for a capture: give DIR, not --scans");
         }
         return leave_one_out::run(scans, args);
     };
@@ -114,7 +114,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     spinner.finish_and_clear();
     let found = found.with_context(|| format!("frame {} of {}", args.frame, folder.display()))?;
     let errors = shape_errors(&body_of(&model, &found), &truth)
-        .context("the true mesh has no surface, or none of its joints is called as one of the model's")?;
+        .context("the true mesh has no surface, or none of its joints has the name of one of the model's")?;
     print(&errors, &found, seconds);
     if let Some(folder) = &args.overlay {
         overlays(folder, &capture, args.frame, &views, &found)?;

@@ -38,7 +38,7 @@ pub struct Args {
     /// What the database may hold of a trial
     #[arg(long, value_enum, default_value_t = ProtocolName::TrialOut)]
     protocol: ProtocolName,
-    /// Add to the database what is made of its motion: mirror, warp (as fast times 0.8 and 1.25)
+    /// Add to the database what is made of its motion: mirror, warp (0.8 and 1.25 times the speed)
     #[arg(long, value_enum, value_delimiter = ',', value_name = "WAY")]
     augment: Vec<Augmentation>,
     #[command(flatten)]
@@ -127,7 +127,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     bar.finish();
     let rows = summarise(&results, evaluation.protocol);
     if rows.is_empty() {
-        bail!("every trial is shorter than the gap with half a second before and after it");
+        bail!("no trial is long enough for the gap with half a second before and after it");
     }
     let outcome = Outcome {
         synthetic: train.iter().chain(&test).any(is_synthetic),

@@ -20,7 +20,7 @@ pub struct SweepArgs {
     /// Number of nearest windows
     #[arg(long, value_name = "K")]
     neighbours: Option<usize>,
-    /// Sizes of the database: the first whole clips, mixed by name, with at least so many poses; or all
+    /// Sizes of the database: the first whole clips, mixed by name, with at least this many poses; or all
     #[arg(long, value_delimiter = ',', value_name = "POSES")]
     database_size: Vec<String>,
     /// Gaussian noise on the control points, standard deviation of each coordinate, millimetres
@@ -32,10 +32,10 @@ pub struct SweepArgs {
     /// Hide a point, or all of them, for a while in the middle of each trial: one:0.5s, all:0.5s
     #[arg(long, value_delimiter = ',', value_name = "WHAT:HOW_LONG")]
     occlusion: Vec<Occlusion>,
-    /// Also with what is measured up to 0.2 s later, as an offline run may; the same as --compare smooth=true
+    /// Also as an offline run, which uses what is measured up to 0.2 s later; the same as --compare smooth=true
     #[arg(long)]
     offline: bool,
-    /// Any other parameter of the reconstruction: NAME=VALUE; may be given often
+    /// Any other parameter of the reconstruction: NAME=VALUE; may be given several times
     #[arg(long = "set", value_name = "NAME=VALUE")]
     set: Vec<String>,
     /// Also with these parameters: NAME=VALUE[,NAME=VALUE…]; each time it is given, it is compared

@@ -67,7 +67,7 @@ impl Outcome<'_> {
         print!("{}", table(self.rows));
         if self.synthetic {
             println!(
-                "\nThe motion is synthetic: it says nothing about recorded motion, nor beside the papers."
+                "\nThe motion is synthetic: its figures say nothing of recorded motion, and don't compare with the papers."
             );
         } else {
             self.print_papers();
@@ -90,7 +90,7 @@ impl Outcome<'_> {
             println!("the defaults were tuned on others: {}", self.tuning.join(" "));
         }
         if evaluation.threads > 1 {
-            println!("{} trials ran at once: frames/s with --threads 1 are higher", evaluation.threads);
+            println!("{} trials ran at once; with --threads 1, frames/s are higher", evaluation.threads);
         }
     }
 
@@ -105,7 +105,7 @@ impl Outcome<'_> {
     }
 
     fn print_papers(&self) {
-        println!("\nbeside the paper (local regression, trial out, its own database):");
+        println!("\ncompared with the paper (local regression, trial out, its own database):");
         let Some(reference) = reference(self.rows) else { return };
         let is_plain =
             |r: &&Row| r.case == Case { method: r.case.method, points: r.case.points, ..reference.clone() };
@@ -162,7 +162,7 @@ impl Outcome<'_> {
             command: command(),
             parameters: parameters.as_object().into_iter().flatten().map(|(n, v)| (n.clone(), word(v))).collect(),
             warning: if self.synthetic {
-                "The motion is synthetic: it says nothing about recorded motion, nor beside the papers.".to_owned()
+                "The motion is synthetic: its figures say nothing of recorded motion, and don't compare with the papers.".to_owned()
             } else {
                 String::new()
             },

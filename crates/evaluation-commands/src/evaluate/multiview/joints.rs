@@ -36,7 +36,9 @@ impl Joints {
         let others = truth.iter().map(|(name, _)| name).filter(|name| is_left_out(name));
         left_out.extend(others.map(|name| format!("{name} (of the truth)")));
         if pairs.is_empty() {
-            bail!("no true joint is called as one of the body's, expected names such as pelvis or l_elbow");
+            bail!(
+                "no true joint has the name of a joint of the body, expected names such as pelvis or l_elbow"
+            );
         }
         Ok(Self { pairs, left_out })
     }
