@@ -26,7 +26,6 @@ pub const SUBSTITUTIONS: &[Substitution] = &[
     on("marey health", "http://127.0.0.1:8080", "$MAREY_URL"),
     // what only the reader has
     on("docs/api.md", "$filmed", "$(cat filmed)"),
-    on("docs/databases.md", "--without 16_15", "--without synthetic1_02"),
     on("docs/foot-contacts.md", " DIR", " recordings"),
     on("docs/skeleton.md", " DIR", " recordings"),
     on(
