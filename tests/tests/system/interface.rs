@@ -215,6 +215,8 @@ fn the_api_page_needs_nothing_from_elsewhere() -> Result<()> {
     assert_eq!(page.status, 200);
     let html = String::from_utf8(page.body)?;
     assert!(html.contains("swagger-ui"), "{html}");
+    // the address alone leads there
+    assert_eq!(stranger.get("/")?.status, 200);
     for attribute in ["src=\"http", "href=\"http", "src=\"//", "href=\"//"] {
         assert!(!html.contains(attribute), "{html}");
     }

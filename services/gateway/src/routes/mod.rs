@@ -20,7 +20,8 @@ use axum::{
     extract::{DefaultBodyLimit, Request, State},
     http::{Method, Uri},
     middleware::{self, Next},
-    response::{IntoResponse, Response},
+    response::{IntoResponse, Redirect, Response},
+    routing::get,
 };
 use tower_http::{catch_panic::CatchPanicLayer, trace::TraceLayer};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -73,6 +74,8 @@ pub fn router(app: App) -> Router {
     let (router, api) = described().split_for_parts();
     router
         .merge(SwaggerUi::new("/docs").url("/openapi.json", openapi::finish(api)))
+        // whoever opens the address alone finds the page
+        .route("/", get(|| async { Redirect::temporary("/docs/") }))
         .fallback(no_such_path)
         .method_not_allowed_fallback(method_not_allowed)
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
