@@ -130,7 +130,7 @@ impl RigFile {
             let fail = |what: &str| Error::Regressor { what: format!("joint {} {what}", joint.name) };
             let row = self.joint_regressor.get(&joint.name).ok_or_else(|| fail("is missing"))?;
             if row.vertices.len() != row.weights.len() {
-                return Err(fail("has not as many weights as vertices"));
+                return Err(fail("does not have as many weights as vertices"));
             }
             rows.push(row.vertices.iter().copied().zip(row.weights.iter().copied()).collect());
         }

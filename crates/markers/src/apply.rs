@@ -125,7 +125,7 @@ impl MarkerMap {
         let markers: Vec<String> = found.markers.iter().map(|i| trajectories.names()[*i].clone()).collect();
         if !found.is_whole() {
             warnings.push(format!(
-                "{}: made of {} alone, the map has {}",
+                "{}: made from {} alone; the map lists {}",
                 point.name,
                 markers.join(", "),
                 found.group.markers.join(", ")

@@ -28,8 +28,8 @@ pub(crate) fn fit(
         |limb: LimbScale| format!("{:+.0} ± {:.0} %", 100.0 * (limb.scale - 1.0), 100.0 * limb.sigma);
     let sizes = Sizes::from_skeleton(&fitted.skeleton);
     warnings.push(format!(
-        "no skeleton file: one was fitted, {:.2} m high in its rest pose (less than the stature); against the mean of the {} \
-         performers of the database: arms {}, legs {}, trunk {}",
+        "no skeleton file: one was fitted, {:.2} m high in its rest pose (less than the stature); compared with the mean of the \
+         {} performers of the database: arms {}, legs {}, trunk {}",
         sizes.height_m,
         fitted.performers,
         percent(arms),

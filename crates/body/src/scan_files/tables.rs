@@ -20,7 +20,7 @@ impl Table {
     /// Reads a table; every row has as many cells as the first line.
     pub fn read(entry: &Entry) -> Result<Self> {
         let text = std::str::from_utf8(&entry.bytes)
-            .map_err(|_| Error::content(&entry.name, "bytes that are no text", "comma-separated text"))?;
+            .map_err(|_| Error::content(&entry.name, "bytes that are not text", "comma-separated text"))?;
         let cells = |line: &str| -> Vec<String> {
             line.split(',').map(|cell| cell.trim().trim_matches('"').to_owned()).collect()
         };

@@ -32,7 +32,7 @@ use texture::Texture;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png and groundtruth/joints.json; images/CAMERA/0000.jpg, where \
-there are any, show points of the person that are found again, and are the background of the overlays. The body's shape and its first pose are found in the first frame, without a start given; \
+there are any, show points of the person that are found again, and are the background of the overlays. The body's shape and its first pose are found in the first frame, without a starting pose; \
 then it is followed from frame to frame.
 
 Joints are compared by name. Beside the result stand two that need less: local optimisation without particles, and the first pose kept \

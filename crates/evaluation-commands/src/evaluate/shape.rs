@@ -159,7 +159,7 @@ fn print(errors: &ShapeErrors, found: &Fit, seconds: f64) {
     let views = found.views.iter().map(|view| format!("{} {:.3}", view.camera, view.iou));
     println!("overlap              {}", views.collect::<Vec<_>>().join(", "));
     println!("confidence           {:.2}, {seconds:.1} s", found.confidence);
-    println!("(paper: one subject beside a laser scan, 8 views)");
+    println!("(paper: one subject compared with a laser scan, 8 views)");
 }
 
 /// One picture a camera.

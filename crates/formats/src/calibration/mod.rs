@@ -114,7 +114,7 @@ impl Kind {
 
 fn json(text: &str) -> Result<serde_json::Value> {
     serde_json::from_str(text).map_err(|error| {
-        Error::at_line(error.line(), format!("no JSON ({error})"), "the JSON of a calibration")
+        Error::at_line(error.line(), format!("text that is not JSON ({error})"), "the JSON of a calibration")
     })
 }
 
@@ -123,6 +123,6 @@ fn toml(text: &str) -> Result<serde_json::Value> {
         let start = error.span().map_or(0, |span| span.start.min(text.len()));
         let line = text.as_bytes()[..start].iter().filter(|byte| **byte == b'\n').count() + 1;
         let message = error.message().chars().take(200).collect::<String>();
-        Error::at_line(line, format!("no TOML ({message})"), "the TOML of a calibration")
+        Error::at_line(line, format!("text that is not TOML ({message})"), "the TOML of a calibration")
     })
 }

@@ -12,7 +12,7 @@ const SUBPIXELS: f64 = 64.0;
 pub(super) fn read(text: &str, warnings: &mut Warnings) -> Result<FileCameras> {
     let document = Document::parse(text).map_err(|error| {
         let line = error.pos().row as usize;
-        Error::at_line(line, format!("no XML ({error})"), "the XML of a Qualisys calibration")
+        Error::at_line(line, format!("text that is not XML ({error})"), "the XML of a Qualisys calibration")
     })?;
     let root = document.root_element();
     if !root.has_tag_name("calibration") {

@@ -160,7 +160,7 @@ fn what_is_wrong_in_a_qualisys_file_is_told_with_its_line() {
     let broken = text.replacen("r22=\"0.05946489349975602\"", "r22=\"nan\"", 1);
     assert_eq!(error("q.txt", &broken), "line 10: found transform r22=\"nan\", expected a number");
     let broken = text.replacen("</camera>", "", 1);
-    assert!(error("q.txt", &broken).contains("found no XML"));
+    assert!(error("q.txt", &broken).contains("found text that is not XML"));
     let turned = text.replacen("viewrotation=\"0\"", "viewrotation=\"90\"", 1);
     assert!(read("q.txt", &turned).1[0].starts_with("line 5: camera cam01: shown turned by 90 degrees"));
     assert_eq!(

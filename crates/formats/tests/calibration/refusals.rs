@@ -60,8 +60,8 @@ fn cameras_that_cannot_be_are_refused_by_name() {
             .contains("camera cam0: no translation, expected 3 numbers, named t, T")
     );
     assert!(error("c.json", "{}").contains("found no camera"));
-    assert!(error("c.json", "{\"cameras\": [").starts_with("line 1: found no JSON"));
-    assert!(error("c.toml", "[cam\nx = 1").starts_with("line 1: found no TOML"));
+    assert!(error("c.json", "{\"cameras\": [").starts_with("line 1: found text that is not JSON"));
+    assert!(error("c.toml", "[cam\nx = 1").starts_with("line 1: found text that is not TOML"));
 }
 
 #[test]

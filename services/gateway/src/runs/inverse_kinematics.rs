@@ -58,7 +58,7 @@ pub(super) struct InverseKinematicsRequest {
     /// `image-constrained` if the session has cameras, else `priority`
     #[schema(example = "image-constrained")]
     solver: Option<String>,
-    /// most steps of one solve, 1 to 200; 15 when left out
+    /// largest number of steps for each frame, 1 to 200; 15 when left out
     #[schema(example = 15)]
     steps: Option<usize>,
     /// frames a second that are solved; the cameras', or else those of the file of points, when left out

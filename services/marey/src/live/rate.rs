@@ -31,7 +31,7 @@ impl Rate {
             let step = if ratio.is_finite() && ratio > 0.0 { ratio.round().max(1.0) } else { 1.0 };
             if (ratio - step).abs() > TOLERANCE * step {
                 warning = Some(format!(
-                    "the first lines are {:.4} s apart; every line is taken for a sixtieth of a second: expected 60 lines a \
+                    "the first lines are {:.4} s apart; every line counts as a sixtieth of a second: expected 60 lines a \
                      second, or a multiple of it",
                     seconds - first
                 ));
