@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use crate::{
     Error, Place, Read, Result,
-    read::Warnings,
+    read::{Warnings, counted},
     text::{Line, Lines, finite, quote, words},
 };
 
@@ -35,7 +35,7 @@ pub fn read(bytes: &[u8]) -> Result<Read<Mesh>> {
         return Err(Error::whole_file("no vertex", "lines that begin with v"));
     }
     if polygons > 0 {
-        let message = format!("{polygons} faces of more than three corners became triangles");
+        let message = format!("{} of more than three corners became triangles", counted(polygons, "face"));
         warnings.add(Place::File, message);
     }
     Ok(warnings.beside(Mesh::new(mesh.vertices, mesh.faces)?))

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use crate::{
     Error, Place, PointsOptions, Read, Result,
     points::{self, PointNames},
-    read::Warnings,
+    read::{Warnings, counted},
     text::{Line, Lines, Names, number, quote},
     time_grid::Times,
 };
@@ -99,7 +99,8 @@ pub fn read_with(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTraj
         return Err(Error::at_line(header.number, "a header without rows", "rows"));
     }
     if not_whole > 0 {
-        let message = format!("{not_whole} samples lack one or two coordinates; they count as missing");
+        let message =
+            format!("{} with only one or two coordinates taken as missing", counted(not_whole, "sample"));
         warnings.add(Place::File, message);
     }
     let grid = times.grid(None, max_frames, &mut warnings)?;

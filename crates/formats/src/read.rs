@@ -2,6 +2,12 @@ use std::fmt;
 
 use crate::Place;
 
+/// A number with its noun: `1 row`, `2 rows`.
+pub(crate) fn counted(count: usize, noun: &str) -> String {
+    let ending = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{ending}")
+}
+
 /// Warnings kept per file; the rest are only counted, so that a hostile file can't fill memory with them.
 const KEPT: usize = 50;
 
@@ -61,7 +67,7 @@ impl Warnings {
 
     pub(crate) fn beside<T>(mut self, value: T) -> Read<T> {
         if self.dropped > 0 {
-            let message = format!("{} more warnings are not shown", self.dropped);
+            let message = format!("{} not shown", counted(self.dropped, "more warning"));
             self.kept.push(Warning { place: Place::File, message });
         }
         Read { value, warnings: self.kept }

@@ -3,7 +3,7 @@
 use crate::{
     Error, Result,
     frame_rate::{decimals, from_period},
-    read::Warnings,
+    read::{Warnings, counted},
     text::{finite, quote},
 };
 
@@ -96,10 +96,13 @@ impl Times {
             frames.push(frame);
         }
         if missing > 0 {
-            warnings.line(first_line, format!("{missing} frames between the rows are missing"));
+            warnings.line(first_line, format!("{} missing between the rows", counted(missing, "frame")));
         }
         if uneven > 0 {
-            warnings.line(first_line, format!("the times of {uneven} rows are off the {rate} Hz grid"));
+            warnings.line(
+                first_line,
+                format!("the times of {} are off the {rate} Hz grid", counted(uneven, "row")),
+            );
         }
         Ok(Grid { rate, frames })
     }

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use crate::{
     Error, Place, PointsOptions, Read, Result,
     points::{self, PointNames},
-    read::Warnings,
+    read::{Warnings, counted},
     text::{Line, Lines, Names, finite, number, push_number, quote},
     time_grid::Times,
 };
@@ -37,7 +37,7 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
     }
     if rows.short > 0 {
         let message =
-            format!("{} rows end early; the markers that they leave out count as missing", rows.short);
+            format!("{} cut short: the markers left out are taken as missing", counted(rows.short, "row"));
         warnings.add(Place::File, message);
     }
     let mut at_origin = 0;
@@ -48,7 +48,8 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
         *position = points::y_up(up, measured);
     }
     if at_origin > 0 {
-        warnings.add(Place::File, format!("{at_origin} samples at exactly 0 0 0 count as missing"));
+        let message = format!("{} at exactly 0 0 0 taken as missing", counted(at_origin, "sample"));
+        warnings.add(Place::File, message);
     }
     header.check_rows(rows.positions.len() / points, &mut warnings);
     let grid = rows.times.grid(header.rate, max_frames, &mut warnings)?;

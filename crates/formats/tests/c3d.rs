@@ -78,7 +78,7 @@ fn a_trial_is_the_same_from_c3d_and_from_trc() {
         messages,
         [
             "line 7: the header says 250 Hz, the times say 25 Hz; the times are taken",
-            "line 7: the times of 1 rows are off the 25 Hz grid"
+            "line 7: the times of 1 row are off the 25 Hz grid"
         ]
     );
     let (binary, text) = (binary.value, text.value);

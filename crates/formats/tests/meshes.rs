@@ -73,7 +73,7 @@ fn polygons_normals_and_negative_numbers_of_obj_are_understood() {
                 g a\nusemtl m\ns off\nf 1/1/1 2//1 3/1 -1\nf -4 -3 -2\n";
     let read = obj::read(text.as_bytes()).unwrap();
     assert_eq!(read.value.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
-    assert_eq!(read.warnings[0].to_string(), "1 faces of more than three corners became triangles");
+    assert_eq!(read.warnings[0].to_string(), "1 face of more than three corners became triangles");
     for (text, message) in [
         ("v 0 0\n", "line 1: found \"v 0 0\", expected three coordinates"),
         ("v 0 0 nan\n", "line 1: found \"nan\", expected a coordinate"),

@@ -240,7 +240,7 @@ fn units_names_with_blanks_and_trailing_tabs_are_read() {
     assert!((hand - nalgebra::Vector3::new(0.1, 0.3, -0.2)).norm() < 1e-12);
     assert_eq!(points.position(1, 1), None);
     assert_eq!(points.position(2, 0), None);
-    assert_eq!(read.warnings[0].message, "1 samples at exactly 0 0 0 count as missing");
+    assert_eq!(read.warnings[0].message, "1 sample at exactly 0 0 0 taken as missing");
 }
 
 #[test]

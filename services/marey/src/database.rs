@@ -255,8 +255,11 @@ fn start(
     let uploads = if files.is_empty() { Vec::new() } else { pack::pack(name, files)? };
     let database: MotionDatabase = client.post("/v1/motion-databases", made)?;
     for upload in uploads {
-        let packed =
-            if upload.num_files > 0 { format!(" ({} files)", upload.num_files) } else { String::new() };
+        let packed = if upload.num_files > 0 {
+            format!(" ({})", counted(upload.num_files as u64, "file"))
+        } else {
+            String::new()
+        };
         println!("uploading {}{packed}", upload.name);
         let path = format!("/v1/motion-databases/{}/files/{}", database.id, encode(&upload.name));
         client.put_file(&path, upload.file)?;

@@ -11,6 +11,8 @@ use markers::{Fit, MarkerMap, fits};
 use model::{Axis, PointTrajectories};
 use serde_json::{Map, Value, json};
 
+use crate::words::counted;
+
 /// Fits that are shown.
 const SHOWN: usize = 3;
 
@@ -64,10 +66,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let file = read.value;
     let seconds = file.num_frames() as f64 / file.frame_rate();
     println!(
-        "{}: {} markers, {} frames at {} Hz ({seconds:.1} s)",
+        "{}: {}, {} at {} Hz ({seconds:.1} s)",
         path.display(),
-        file.num_points(),
-        file.num_frames(),
+        counted(file.num_points() as u64, "marker"),
+        counted(file.num_frames() as u64, "frame"),
         file.frame_rate()
     );
     let found = fits(file.names());

@@ -6,7 +6,7 @@ use anyhow::Context;
 use client::{Client, ServerArgs, Session, encode};
 use serde_json::Value;
 
-use crate::session_files;
+use crate::{session_files, words::counted};
 
 /// Upload what was recorded: control points and a skeleton, or a calibration and what the cameras saw
 ///
@@ -70,9 +70,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 fn put(client: &Client, session: &Session, name: &str, role: Option<&str>, file: File) -> anyhow::Result<()> {
     let stored = send(client, session, name, role, file)?;
     println!(
-        "uploaded {name} as {} ({} bytes)",
+        "uploaded {name} as {} ({})",
         stored["role"].as_str().unwrap_or("?"),
-        stored["bytes"].as_u64().unwrap_or_default()
+        counted(stored["bytes"].as_u64().unwrap_or_default(), "byte")
     );
     Ok(())
 }

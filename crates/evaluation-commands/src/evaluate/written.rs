@@ -80,7 +80,7 @@ impl Outcome<'_> {
         let Self { evaluation, .. } = self;
         let tested = self.tested();
         println!(
-            "\nprotocol {}; {} trials in the database; tested on {}:",
+            "\nprotocol {}; trials in the database: {}; tested on {}:",
             evaluation.protocol,
             evaluation.train.len(),
             tested.len()

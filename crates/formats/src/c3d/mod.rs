@@ -9,7 +9,11 @@ mod write;
 use model::{Axis, PointTrajectories};
 
 use crate::{
-    Error, Place, PointsOptions, Read, Result, error::at_byte, points, points::PointNames, read::Warnings,
+    Error, Place, PointsOptions, Read, Result,
+    error::at_byte,
+    points,
+    points::PointNames,
+    read::{Warnings, counted},
     text::quote,
 };
 pub use write::write;
@@ -58,7 +62,8 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
         positions.push(position.unwrap_or(nalgebra::Vector3::repeat(f64::NAN)));
     }
     if at_origin > 0 {
-        warnings.add(Place::File, format!("{at_origin} samples at exactly 0 0 0 count as missing"));
+        let message = format!("{} at exactly 0 0 0 taken as missing", counted(at_origin, "sample"));
+        warnings.add(Place::File, message);
     }
     let names = names(&parameters, header.points, &mut warnings);
     let trajectories = PointTrajectories::new(names, header.rate, positions)?.with_sigmas(sigmas)?;

@@ -6,7 +6,10 @@ mod values;
 use model::Mesh;
 use nalgebra::Vector3;
 
-use crate::{Error, Place, Read, Result, read::Warnings};
+use crate::{
+    Error, Place, Read, Result,
+    read::{Warnings, counted},
+};
 use header::{Element, Header, Property};
 use values::Values;
 
@@ -39,7 +42,7 @@ pub fn read(bytes: &[u8]) -> Result<Read<Mesh>> {
         return Err(Error::whole_file("no vertex", "an element vertex with x, y and z"));
     }
     if polygons > 0 {
-        let message = format!("{polygons} faces of more than three corners became triangles");
+        let message = format!("{} of more than three corners became triangles", counted(polygons, "face"));
         warnings.add(Place::File, message);
     }
     if !values.is_at_end() {

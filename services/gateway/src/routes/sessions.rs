@@ -100,9 +100,10 @@ pub(super) async fn delete(
         sessions::find(&mut tx, caller.project_id, id, Lock::Update).await?;
         let active = sessions::count_active_runs(&mut tx, id).await?;
         if active > 0 {
-            return Err(Error::Conflict(format!(
-                "{active} runs of this session are under way; cancel them first"
-            )));
+            return Err(Error::Conflict(match active {
+                1 => "a run of this session is under way; cancel it first".to_owned(),
+                _ => format!("{active} runs of this session are under way; cancel them first"),
+            }));
         }
         let runs = sessions::delete(&mut tx, id).await?;
         tx.commit().await?;
