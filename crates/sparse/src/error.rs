@@ -99,7 +99,7 @@ pub enum Error {
     },
     /// Method gplvm without a model.
     #[error(
-        "method is gplvm and the motion database has no trained latent variable model, expected one to be trained first"
+        "method gplvm needs a trained latent variable model, and the motion database has none; train it first"
     )]
     NoModel,
     /// A latent variable model of another database.

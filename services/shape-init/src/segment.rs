@@ -123,7 +123,7 @@ impl<'a, S: Sink> Packer<'a, S> {
                 Some(count) => format!("{count} frames"),
                 None => format!("no frame {first}"),
             };
-            let expected = format!("more than {first}, which is first_frame");
+            let expected = format!("more than first_frame, {first}");
             return Err(FileError::unexpected(name, found, expected).into());
         }
         self.close();
