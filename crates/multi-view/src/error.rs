@@ -26,7 +26,7 @@ pub enum Error {
         second: String,
     },
     /// The map names something that isn't there.
-    #[error("camera_files has {found:?}, expected {expected}")]
+    #[error("--camera FILE=CAMERA (camera_files) has {found:?}, expected {expected}")]
     Map {
         /// what it names
         found: String,

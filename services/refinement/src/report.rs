@@ -171,7 +171,11 @@ fn ranges(frames: &[usize]) -> String {
         _ => format!("{}", run[0]),
     });
     let said = said.collect::<Vec<_>>().join(", ");
-    if runs.len() > LISTED { format!("frames {said}, …") } else { format!("frames {said}") }
+    match frames {
+        [_] => format!("frame {said}"),
+        _ if runs.len() > LISTED => format!("frames {said}, …"),
+        _ => format!("frames {said}"),
+    }
 }
 
 #[cfg(test)]
@@ -180,7 +184,7 @@ mod tests {
 
     #[test]
     fn frames_are_listed_as_ranges() {
-        assert_eq!(ranges(&[3]), "frames 3");
+        assert_eq!(ranges(&[3]), "frame 3");
         assert_eq!(ranges(&[3, 4, 5, 9]), "frames 3–5, 9");
         assert_eq!(ranges(&[1, 3, 5, 7, 9, 11]), "frames 1, 3, 5, 7, 9, …");
     }

@@ -113,9 +113,12 @@ pub(crate) fn match_cameras(
     let (plate_names, plate_map) = known(&plates);
     if let Some(stray) = map.keys().find(|name| !own.contains_key(*name) && !plate_map.contains_key(*name)) {
         let all = names.iter().chain(&plate_names).cloned().collect::<Vec<_>>().join(", ");
-        return Err(
-            FileError::unexpected("camera_files", format!("{stray:?}"), format!("one of {all}")).into()
-        );
+        return Err(FileError::unexpected(
+            "--camera FILE=CAMERA (camera_files)",
+            format!("{stray:?}"),
+            format!("one of {all}"),
+        )
+        .into());
     }
     let assigned = assign(&names, cameras, &own)?;
     let mut found: Vec<CameraSources> = assigned
