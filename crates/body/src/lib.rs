@@ -66,7 +66,7 @@ pub use scan_files::{ScanOptions, ScanSet, is_scan_file};
 pub use shape::{BodyModel, MAX_COMPONENTS, MAX_VERTICES, ModelParts, Shape};
 pub use shipped::{Shipped, shipped};
 pub use skin::Skin;
-pub use subject::{Sex, Subject};
+pub use subject::{Sex, Subject, UnknownSex};
 pub use template::{KnownJoints, Template, TemplateParts};
 
 /// Result of the fallible functions of this crate.

@@ -10,6 +10,26 @@ pub enum Sex {
     Male,
 }
 
+/// A word that is not a sex.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("sex is {found:?}, expected female or male")]
+pub struct UnknownSex {
+    /// the word
+    pub found: String,
+}
+
+impl std::str::FromStr for Sex {
+    type Err = UnknownSex;
+
+    fn from_str(word: &str) -> Result<Self, UnknownSex> {
+        match word {
+            "female" => Ok(Self::Female),
+            "male" => Ok(Self::Male),
+            found => Err(UnknownSex { found: found.to_owned() }),
+        }
+    }
+}
+
 /// What is known of a scanned person besides the scan.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Subject {

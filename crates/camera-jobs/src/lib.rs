@@ -11,6 +11,6 @@ mod silhouettes;
 mod views;
 
 pub use session::tracking_session;
-pub use shapes::{ShapeError, shape};
+pub use shapes::{ShapeError, sex, shape};
 pub use silhouettes::{Silhouettes, View, reports};
 pub use views::{Views, views};

@@ -16,6 +16,20 @@ pub enum ShapeError {
     Body(#[from] body::Error),
 }
 
+/// The sex that a call names; empty: not said.
+///
+/// # Errors
+/// If it is another word.
+pub fn sex(word: &str) -> Result<Option<Sex>, proto::Error> {
+    if word.is_empty() {
+        return Ok(None);
+    }
+    let expected = "female or male";
+    let sex =
+        word.parse().map_err(|_| proto::Error::OutOfRange { field: "sex", found: word.to_owned(), expected });
+    sex.map(Some)
+}
+
 /// The body of a description: of coefficients, or of simple measurements.
 ///
 /// # Errors
@@ -25,13 +39,7 @@ pub fn shape(model: &BodyModel, described: &BodyDescription) -> Result<Shape, Sh
         Err(ShapeError::Request(proto::Error::OutOfRange { field, found, expected }))
     };
     let BodyDescription { alpha, stature_m, mass_kg, age_years, sex } = described;
-    let sex = match sex.as_deref().unwrap_or_default() {
-        "" => None,
-        "female" => Some(Sex::Female),
-        "male" => Some(Sex::Male),
-        other => return refuse("sex", other.to_owned(), "female or male"),
-    };
-    let wanted = Wanted { stature_m: *stature_m, mass_kg: *mass_kg, age_years: *age_years, sex };
+    let wanted = Wanted { stature_m: *stature_m, mass_kg: *mass_kg, age_years: *age_years, sex: *sex };
     if alpha.is_empty() {
         return Ok(model.shape(&model.alpha_for(&wanted)?));
     }

@@ -1,6 +1,6 @@
 //! Runs that learn body models from scans.
 
-pub use crate::versions::{BodyModelFile, BodyModelName, SHIPPED};
+pub use crate::versions::{BodyModelFile, SHIPPED, VersionName};
 use crate::{
     InputFile,
     run_json::{FileReport, LearnedFrom, Request, Subject, VersionReport},
@@ -19,7 +19,7 @@ pub const RUN_KIND: &str = "body-model";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BuildBodyModel {
     /// The model to build.
-    pub body_model: BodyModelName,
+    pub body_model: VersionName,
     /// Archives and files of scans, in order of name.
     pub files: Vec<InputFile>,
     /// Most principal components.
@@ -39,7 +39,7 @@ impl Request for BuildBodyModel {
     }
 
     fn subject(&self) -> Subject<'_> {
-        let BodyModelName { id, name, version } = &self.body_model;
+        let VersionName { id, name, version } = &self.body_model;
         let files = FileReport::all(&self.files);
         Subject::BodyModel(VersionReport { id: *id, name, version: *version, blake3: None, files })
     }

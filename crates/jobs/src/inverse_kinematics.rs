@@ -1,5 +1,6 @@
 //! Runs by inverse kinematics: one job solves measured points, and silhouettes of cameras where there are any.
 
+pub use body::Sex;
 pub use inverse_kinematics::Method;
 use queue::Job;
 use serde::{Deserialize, Serialize};
@@ -27,7 +28,7 @@ pub struct BodyDescription {
     /// years
     pub age_years: Option<f64>,
     /// `female` or `male`
-    pub sex: Option<String>,
+    pub sex: Option<Sex>,
 }
 
 /// How a session is solved by inverse kinematics.

@@ -2,7 +2,7 @@
 
 mod augment;
 
-pub use crate::versions::{MotionDatabaseFile, MotionDatabaseName};
+pub use crate::versions::{MotionDatabaseFile, VersionName};
 pub use augment::{Augment, Error};
 use queue::Job;
 use regression::gplvm::TrainingOptions;
@@ -28,7 +28,7 @@ pub const TRAINING_RUN_KIND: &str = "training";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanMotionDatabase {
     /// The database to build.
-    pub motion_database: MotionDatabaseName,
+    pub motion_database: VersionName,
     /// The database whose clips it begins with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base: Option<MotionDatabaseFile>,
@@ -66,7 +66,7 @@ impl Request for PlanMotionDatabase {
     }
 
     fn subject(&self) -> Subject<'_> {
-        let MotionDatabaseName { id, name, version } = &self.motion_database;
+        let VersionName { id, name, version } = &self.motion_database;
         let files = FileReport::all(&self.files);
         Subject::MotionDatabase(VersionReport { id: *id, name, version: *version, blake3: None, files })
     }

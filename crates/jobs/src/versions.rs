@@ -8,10 +8,10 @@ use crate::Object;
 /// Name of the body model that comes with the program; it has no row and no object.
 pub const SHIPPED: &str = "shipped";
 
-/// A body model by id, name and version.
+/// One version of a body model or motion database, by id, name and number.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct BodyModelName {
-    /// The row in `body_models`.
+pub struct VersionName {
+    /// The row in the table of its kind.
     pub id: Uuid,
     /// Name in its project.
     pub name: String,
@@ -33,17 +33,6 @@ pub struct BodyModelFile {
     pub store_key: Option<String>,
     /// BLAKE3 of its file, hex.
     pub blake3: String,
-}
-
-/// A motion database by id, name and version.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MotionDatabaseName {
-    /// The row in `motion_databases`.
-    pub id: Uuid,
-    /// Name in its project.
-    pub name: String,
-    /// Version of that name, from 1.
-    pub version: i32,
 }
 
 /// A motion database that is ready.

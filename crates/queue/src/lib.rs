@@ -57,6 +57,7 @@ mod finish;
 mod ids;
 mod job;
 mod lease;
+mod on_complete;
 mod read;
 mod reap;
 mod run;
@@ -72,12 +73,13 @@ pub use finish::{Completion, Failure, Lease, Settled, acknowledge_cancel, comple
 pub use ids::{JobId, LeaseNumber, ProjectId, RunId};
 pub use job::{Artefact, ChildJob, ClaimedJob, DEFAULT_MAX_ATTEMPTS, Job, NewJob};
 pub use lease::{Beat, BeatAnswer, heartbeat};
+pub use on_complete::OnComplete;
 pub use read::{Depth, InputArtefact, dependency_artefacts, depth, run_results};
 pub use reap::{Reaped, reap};
 pub use run::{NewRun, RunStatus, cancel_run, enqueue_run, run_status};
 pub use settings::{heartbeat_interval, set_staleness, staleness};
 pub use state::{JobState, RunState};
-pub use worker::{Handler, JobContext, OnComplete, Outcome, Worker, WorkerBuilder, WorkerHandle};
+pub use worker::{Handler, JobContext, Outcome, Worker, WorkerBuilder, WorkerHandle};
 
 /// The schema of the whole system, `migrations/` in the repository.
 pub static MIGRATOR: sqlx::migrate::Migrator = sqlx::migrate!("../../migrations");

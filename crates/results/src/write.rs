@@ -1,8 +1,10 @@
-use std::ops::Range;
+use std::{ops::Range, path::Path};
 
 use queue::{Artefact, JobContext, JobError};
 use service::{compute, objects};
-use store::Store;
+use store::{Store, Stored, UploadLimits, key};
+use tokio::fs::File;
+use tokio_util::io::ReaderStream;
 
 use crate::{ResultFile, file::Content};
 
@@ -35,11 +37,24 @@ pub async fn write(
 /// As [`write()`].
 pub async fn write_one(store: &Store, context: &JobContext, file: ResultFile) -> Result<Artefact, JobError> {
     let ResultFile { name, media_type, content } = file;
-    match content {
+    let written = match content {
         Content::Made(make) => {
             let content = compute::run(make).await?;
-            objects::write_result(store, context, &name, media_type, content).await
+            objects::write(store, context, &name, media_type, content).await?
         }
-        Content::File(path) => objects::write_result_file(store, context, &name, media_type, &path).await,
-    }
+        Content::File(path) => {
+            let stored = upload(store, context, &name, &path).await?;
+            objects::artefact(&name, media_type, stored)
+        }
+    };
+    Ok(Artefact { is_result: true, ..written })
+}
+
+/// Stores a file without holding it in memory.
+async fn upload(store: &Store, context: &JobContext, name: &str, path: &Path) -> Result<Stored, JobError> {
+    let key = key::artefact(context.run_id().0, context.id().0, context.lease_number().0, name)
+        .map_err(JobError::retry)?;
+    let file = File::open(path).await.map_err(JobError::retry)?;
+    let limits = UploadLimits { max_bytes: u64::MAX, ..UploadLimits::default() };
+    store.put_stream(&key, ReaderStream::new(file), &limits).await.map_err(JobError::retry)
 }

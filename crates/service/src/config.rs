@@ -9,10 +9,10 @@
 //! | `MAREY_WORKER_CONCURRENCY` | number of cores | jobs at once; 0 serves gRPC only |
 //! | `MAREY_WORKER_NAME` | service, host, process id | how this process shows in the queue and in `run.json` |
 //! | `MAREY_SHUTDOWN_GRACE_SECS` | 20 | how long calls and jobs may go on after a signal |
-//! | `MAREY_DATABASE_CACHE_BYTES` | 2 GiB | motion databases kept in memory |
+//! | `MAREY_DATABASE_CACHE_BYTES` | 2 GiB | what was learned and is kept in memory from one use to the next |
 //! | `MAREY_MAX_OBJECT_BYTES` | 1 GiB | largest object read into memory |
-//! | `MAREY_MAX_INPUT_BYTES` | 8 GiB | unpacked motion files of one motion database |
-//! | `MAREY_MAX_BUILD_BYTES` | 2 GiB | what one job of building a motion database keeps: an archive unpacked, or an index |
+//! | `MAREY_MAX_INPUT_BYTES` | 8 GiB | unpacked files of one build |
+//! | `MAREY_MAX_BUILD_BYTES` | 2 GiB | what one job of a build keeps in memory: an archive unpacked, or what is built |
 //! | `MAREY_MAX_SESSION_FRAMES` | 432000 | frames of one session at 60 a second: two hours |
 //! | `MAREY_LOG` | `info` | filter: `info`, `warn,motion_index=debug`, … |
 //! | `MAREY_LOG_FORMAT` | `pretty` | `pretty` or `json` |
@@ -85,14 +85,14 @@ impl WorkerConfig {
 /// Bounds on memory.
 #[derive(Debug, Clone)]
 pub struct MemoryConfig {
-    /// Motion databases kept for queries and jobs, bytes as counted in memory. Default 2 GiB.
-    pub database_cache_bytes: u64,
+    /// What was learned and is kept for queries and jobs, bytes as counted in memory. Default 2 GiB.
+    pub cache_bytes: u64,
     /// Largest object that is read into memory, bytes. Default 1 GiB: two hours of 120 fps AMC are 400 MB.
     pub max_object_bytes: u64,
-    /// Unpacked motion files of one motion database, bytes. Default 8 GiB: all of the CMU library is 5.
+    /// Unpacked files of one build, bytes. Default 8 GiB: all of the CMU library is 5.
     pub max_input_bytes: u64,
-    /// What one job of building a motion database keeps in memory, bytes: an archive unpacked, or an index file and its
-    /// poses. Default 2 GiB: 2 million poses of 62 numbers.
+    /// What one job of a build keeps in memory, bytes: an archive unpacked, or what is built. Default 2 GiB: 2 million poses of
+    /// 62 numbers.
     pub max_build_bytes: u64,
     /// Frames of one session at 60 a second. Default 432 000, two hours: putting it together takes about 4 kB a frame.
     pub max_session_frames: usize,
@@ -118,7 +118,7 @@ impl Config {
                 shutdown_grace: grace,
             },
             memory: MemoryConfig {
-                database_cache_bytes: 2 * GIB,
+                cache_bytes: 2 * GIB,
                 max_object_bytes: GIB,
                 max_input_bytes: 8 * GIB,
                 max_build_bytes: 2 * GIB,
@@ -149,7 +149,7 @@ impl Config {
         vars.set("MAREY_SHUTDOWN_GRACE_SECS", &mut grace_secs)?;
         config.grpc.shutdown_grace = Duration::from_secs(grace_secs);
         config.worker.shutdown_grace = Duration::from_secs(grace_secs);
-        vars.set("MAREY_DATABASE_CACHE_BYTES", &mut config.memory.database_cache_bytes)?;
+        vars.set("MAREY_DATABASE_CACHE_BYTES", &mut config.memory.cache_bytes)?;
         vars.set("MAREY_MAX_OBJECT_BYTES", &mut config.memory.max_object_bytes)?;
         vars.set("MAREY_MAX_INPUT_BYTES", &mut config.memory.max_input_bytes)?;
         vars.set("MAREY_MAX_BUILD_BYTES", &mut config.memory.max_build_bytes)?;

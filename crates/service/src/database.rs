@@ -36,7 +36,7 @@ pub async fn wait_until_ready(
     loop {
         let problem = match has_schema(pool).await {
             Ok(true) => return Ok(()),
-            Ok(false) => "the database has no schema yet".to_owned(),
+            Ok(false) => "the database has no schema yet, or an older one than this program needs".to_owned(),
             Err(error) => error.to_string(),
         };
         if looks.is_multiple_of(SAY_EVERY) {
@@ -58,10 +58,17 @@ pub async fn is_reachable(pool: &PgPool) -> Result<(), sqlx::Error> {
     sqlx::query_scalar::<_, i32>("SELECT 1").fetch_one(pool).await.map(|_| ())
 }
 
+/// Whether the schema is at least as new as this program: an older gateway may be about to be replaced by one that brings it up
+/// to date.
 async fn has_schema(pool: &PgPool) -> Result<bool, sqlx::Error> {
-    sqlx::query_scalar(
-        "SELECT to_regclass('jobs') IS NOT NULL AND to_regclass('motion_database_models') IS NOT NULL",
-    )
-    .fetch_one(pool)
-    .await
+    let is_migrated: bool =
+        sqlx::query_scalar("SELECT to_regclass('_sqlx_migrations') IS NOT NULL").fetch_one(pool).await?;
+    if !is_migrated {
+        return Ok(false);
+    }
+    let newest = queue::MIGRATOR.iter().map(|migration| migration.version).max();
+    sqlx::query_scalar("SELECT EXISTS (SELECT FROM _sqlx_migrations WHERE version >= $1 AND success)")
+        .bind(newest)
+        .fetch_one(pool)
+        .await
 }

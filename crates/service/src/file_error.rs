@@ -32,7 +32,7 @@ pub enum FileError {
         /// Which, in brackets.
         names: String,
         /// How many there should be.
-        expected: &'static str,
+        expected: String,
     },
 }
 

@@ -2,9 +2,8 @@
 
 use bytes::Bytes;
 use queue::{Artefact, JobContext, JobError};
-use std::{path::Path, str::FromStr};
-use store::{Error, Key, Store, Stored, UploadLimits, key};
-use tokio_util::io::ReaderStream;
+use std::str::FromStr;
+use store::{Error, Key, Store, Stored, key};
 
 /// An object that a job is told to read.
 #[derive(Debug, Clone, Copy)]
@@ -53,7 +52,8 @@ pub async fn write(
     Ok(artefact(name, media_type, stored))
 }
 
-fn artefact(name: &str, media_type: &str, stored: Stored) -> Artefact {
+/// What a stored object is as an artefact.
+pub fn artefact(name: &str, media_type: &str, stored: Stored) -> Artefact {
     Artefact {
         name: name.to_owned(),
         store_key: stored.key.into(),
@@ -62,39 +62,6 @@ fn artefact(name: &str, media_type: &str, stored: Stored) -> Artefact {
         media_type: media_type.to_owned(),
         is_result: false,
     }
-}
-
-/// Writes an artefact that the user gets.
-///
-/// # Errors
-/// As [`write`].
-pub async fn write_result(
-    store: &Store,
-    job: &JobContext,
-    name: &str,
-    media_type: &str,
-    content: impl Into<Bytes>,
-) -> Result<Artefact, JobError> {
-    Ok(Artefact { is_result: true, ..write(store, job, name, media_type, content).await? })
-}
-
-/// Writes a file as an artefact that the user gets, without holding it in memory.
-///
-/// # Errors
-/// To be tried again if the file or the store failed.
-pub async fn write_result_file(
-    store: &Store,
-    job: &JobContext,
-    name: &str,
-    media_type: &str,
-    path: &Path,
-) -> Result<Artefact, JobError> {
-    let key =
-        key::artefact(job.run_id().0, job.id().0, job.lease_number().0, name).map_err(JobError::retry)?;
-    let file = tokio::fs::File::open(path).await.map_err(JobError::retry)?;
-    let limits = UploadLimits { max_bytes: u64::MAX, ..UploadLimits::default() };
-    let stored = store.put_stream(&key, ReaderStream::new(file), &limits).await.map_err(JobError::retry)?;
-    Ok(Artefact { is_result: true, ..artefact(name, media_type, stored) })
 }
 
 /// Removes what earlier attempts at the job left. Failing to is no reason to fail the job.

@@ -92,8 +92,8 @@ pub struct SampleArgs {
     #[arg(long, value_name = "YEARS")]
     age: Option<f64>,
     /// female or male
-    #[arg(long, value_parser = ["female", "male"])]
-    sex: Option<String>,
+    #[arg(long)]
+    sex: Option<Sex>,
     /// Coefficients of the components, in standard deviations, instead of measurements
     #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true, conflicts_with_all = ["stature", "mass", "age", "sex"])]
     alpha: Vec<f64>,
@@ -274,8 +274,7 @@ fn learn_there(args: &LearnArgs) -> anyhow::Result<()> {
 
 fn sample(args: &SampleArgs) -> anyhow::Result<()> {
     let model = open(&args.model, &args.server)?;
-    let sex = args.sex.as_deref().map(|sex| if sex == "male" { Sex::Male } else { Sex::Female });
-    let wanted = Wanted { stature_m: args.stature, mass_kg: args.mass, age_years: args.age, sex };
+    let wanted = Wanted { stature_m: args.stature, mass_kg: args.mass, age_years: args.age, sex: args.sex };
     let alpha = if args.alpha.is_empty() { model.alpha_for(&wanted)? } else { args.alpha.clone() };
     if alpha.len() > model.num_components() || alpha.iter().any(|a| a.is_nan() || a.abs() > 6.0) {
         bail!(

@@ -1,6 +1,7 @@
 //! `marey run`.
 
 use anyhow::Context;
+use body::Sex;
 use clap::builder::PossibleValuesParser;
 use client::{
     Client, Run, ServerArgs,
@@ -140,8 +141,8 @@ struct InverseKinematicsArgs {
     #[arg(long, value_name = "YEARS")]
     age: Option<f64>,
     /// female or male
-    #[arg(long, value_parser = ["female", "male"])]
-    sex: Option<String>,
+    #[arg(long)]
+    sex: Option<Sex>,
 }
 
 impl InverseKinematicsArgs {

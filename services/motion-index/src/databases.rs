@@ -45,14 +45,14 @@ enum Derived {
 
 impl Databases {
     pub fn new(pool: PgPool, store: Store, memory: &MemoryConfig) -> Self {
-        let databases = (memory.database_cache_bytes as f64 * DATABASE_SHARE) as u64;
+        let databases = (memory.cache_bytes as f64 * DATABASE_SHARE) as u64;
         Self {
             pool,
             store,
             // Lists are small beside what they list.
             lists: Cache::new(databases / 8),
             databases: Cache::new(databases),
-            derived: Cache::new(memory.database_cache_bytes - databases),
+            derived: Cache::new(memory.cache_bytes - databases),
         }
     }
 

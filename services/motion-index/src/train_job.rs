@@ -30,7 +30,7 @@ impl Handler for TrainHandler {
         let own = key::motion_database_job_prefix(file.id, context.id().0);
         objects::clean_up_earlier_attempts_under(store, &context, &own).await;
         context.progress(0.0, "reading the motion database");
-        let most = memory.database_cache_bytes;
+        let most = memory.cache_bytes;
         let opened = motion_database::open(store, &file.store_key, &file.blake3, most).await;
         let database = opened.map_err(|error| error.into_job_error(&full_name(file)))?.database;
         let (watched, options) = (context.clone(), request.parameters);

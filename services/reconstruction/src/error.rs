@@ -3,20 +3,16 @@
 use formats::FileRole;
 use proto::ErrorCode;
 use queue::JobError;
+use service::FileError;
 use uuid::Uuid;
 
 /// Something about the input that only its owner can mend. The message is for them.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputError {
-    /// A file can't be read.
-    #[error("{file}: {source}")]
-    File {
-        /// Name of the file.
-        file: String,
-        /// Where and what.
-        source: formats::Error,
-    },
+    /// A file can't be read, or a role is filled by none or by several.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A file is of a kind that its role does not take.
     #[error("{file}: found a file of another kind, expected {} for role {role}", .role.endings())]
     Kind {
@@ -24,18 +20,6 @@ pub enum InputError {
         file: String,
         /// Its role.
         role: FileRole,
-    },
-    /// A role that must be filled once.
-    #[error("session has {found} files of role {role}{names}, expected {expected}")]
-    Count {
-        /// The role.
-        role: FileRole,
-        /// How many files.
-        found: usize,
-        /// Which, in brackets.
-        names: String,
-        /// How many there should be.
-        expected: String,
     },
     /// The mapping names something that is not in the file.
     #[error("{name:?} of the mapping is not in {file}, which has {has}")]
@@ -112,7 +96,7 @@ pub enum InputError {
         /// Index of the frame.
         frame: usize,
         /// What is wrong.
-        source: service::FileError,
+        source: FileError,
     },
     /// Nobody's body is described.
     #[error(transparent)]

@@ -7,7 +7,8 @@ use results::{Kind, ResultFile, cell, formats, media_type::CSV};
 use std::{fmt::Write as _, sync::Arc};
 
 impl results::Finished for Finished {
-    const KIND: Kind = Kind::Sparse;
+    const KIND: Kind = Kind::SPARSE;
+    const QUALITY: Option<fn(&Self) -> String> = Some(quality);
 
     fn motion(&self) -> &Motion {
         &self.merged.motion
@@ -16,12 +17,9 @@ impl results::Finished for Finished {
 
 /// The motion in every format, and how well it is known.
 pub(crate) fn files(finished: &Arc<Finished>) -> Vec<ResultFile> {
-    let table = |name: &str, write: fn(&Finished) -> String| {
-        let finished = finished.clone();
-        ResultFile::new(name, CSV, move || Ok::<_, JobError>(write(&finished).into_bytes()))
-    };
     let mut files = formats(finished);
-    files.extend([table("quality.csv", quality), table("sigma.csv", sigmas)]);
+    let finished = finished.clone();
+    files.push(ResultFile::new("sigma.csv", CSV, move || Ok::<_, JobError>(sigmas(&finished).into_bytes())));
     files
 }
 

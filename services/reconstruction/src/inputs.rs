@@ -10,6 +10,7 @@ use formats::{
     session::{self, MotionFormat, PointsFormat, SkeletonFormat},
 };
 use model::{Motion, PointTrajectories, Skeleton};
+use service::FileError;
 use sparse::Session;
 use std::sync::Arc;
 
@@ -31,7 +32,7 @@ impl NamedBytes {
     /// If it can't be unpacked, to at most `max_bytes`, or is an archive of several files.
     pub fn unpacked(self, max_bytes: u64) -> Result<Self, InputError> {
         let unpacked = archive::unpacked(&self.name, &self.bytes, max_bytes);
-        match unpacked.map_err(|source| InputError::File { file: self.name.clone(), source })? {
+        match unpacked.map_err(|source| FileError::File { file: self.name.clone(), source })? {
             Some(bytes) => Ok(Self { bytes: bytes.into(), ..self }),
             None => Ok(self),
         }
@@ -114,7 +115,7 @@ pub(crate) fn ground_truth(
         None => asf::File { skeleton: fallback.clone(), metres_per_unit: asf::CMU_METRES_PER_UNIT },
     };
     let read = format.read(&file.bytes, &acclaim, seconds, &reading);
-    Ok(Some(read.map_err(|source| InputError::File { file: file.name.clone(), source })?))
+    Ok(Some(read.map_err(FileError::in_file(&file.name))?))
 }
 
 fn read_skeleton(
@@ -124,7 +125,7 @@ fn read_skeleton(
 ) -> Result<asf::File, InputError> {
     let format = SkeletonFormat::from_name(&file.name).ok_or_else(|| kind_error(file))?;
     let read = format.read(&file.bytes, &reading);
-    Ok(note(read.map_err(|source| InputError::File { file: file.name.clone(), source })?, file, warnings))
+    Ok(note(read.map_err(FileError::in_file(&file.name))?, file, warnings))
 }
 
 /// The name of the file of measured points, and what is in it.
@@ -136,7 +137,7 @@ pub(crate) fn measured_points(
     reading: session::Options,
     warnings: &mut Vec<String>,
 ) -> Result<(String, PointTrajectories), InputError> {
-    let file = at_most_one(files, FileRole::ControlPoints)?.ok_or_else(|| InputError::Count {
+    let file = at_most_one(files, FileRole::ControlPoints)?.ok_or_else(|| FileError::Count {
         role: FileRole::ControlPoints,
         found: 0,
         names: String::new(),
@@ -152,7 +153,7 @@ fn read_points(
 ) -> Result<PointTrajectories, InputError> {
     let format = PointsFormat::from_name(&file.name).ok_or_else(|| kind_error(file))?;
     let read = format.read(&file.bytes, &reading);
-    Ok(note(read.map_err(|source| InputError::File { file: file.name.clone(), source })?, file, warnings))
+    Ok(note(read.map_err(FileError::in_file(&file.name))?, file, warnings))
 }
 
 fn note<T>(read: Read<T>, file: &NamedBytes, warnings: &mut Vec<String>) -> T {
@@ -165,7 +166,7 @@ fn at_most_one(files: &[NamedBytes], role: FileRole) -> Result<Option<&NamedByte
     if found.len() > 1 {
         let names = found.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
         let names = format!(" ({names})");
-        return Err(InputError::Count { role, found: found.len(), names, expected: "one".to_owned() });
+        return Err(FileError::Count { role, found: found.len(), names, expected: "one".to_owned() }.into());
     }
     Ok(found.first().copied())
 }

@@ -35,7 +35,7 @@ pub(crate) struct LiveRpc {
 
 impl LiveRpc {
     pub fn new(shared: Arc<Shared>, config: LiveConfig, shutdown: CancellationToken) -> Self {
-        let bytes = (shared.resources.memory.database_cache_bytes as f64 * TABLE_SHARE) as u64;
+        let bytes = (shared.resources.memory.cache_bytes as f64 * TABLE_SHARE) as u64;
         Self {
             slots: Arc::new(Semaphore::new(config.max_streams)),
             tables: Cache::new(bytes),

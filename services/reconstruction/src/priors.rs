@@ -59,11 +59,11 @@ pub(crate) struct Priors {
 
 impl Priors {
     pub fn new(store: Store, memory: &MemoryConfig) -> Self {
-        let databases = (memory.database_cache_bytes as f64 * DATABASE_SHARE) as u64;
+        let databases = (memory.cache_bytes as f64 * DATABASE_SHARE) as u64;
         Self {
             store,
             databases: Cache::new(databases),
-            indexes: Cache::new(memory.database_cache_bytes - databases),
+            indexes: Cache::new(memory.cache_bytes - databases),
             models: Cache::new(4 * MAX_MODEL_BYTES),
         }
     }

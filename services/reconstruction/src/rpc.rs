@@ -5,7 +5,7 @@ use jobs::motion_database::MotionDatabaseFile;
 use kinematics::{Kinematics, Parametrisation, control_points};
 use model::{PointTrajectories, Skeleton};
 use proto::v1::{self, reconstruction_server::Reconstruction, solve_inverse_kinematics_request::Performer};
-use service::compute::Slots;
+use service::{FileError, compute::Slots};
 use sparse::{Merged, Parameters, Session};
 use std::{ops::ControlFlow, sync::Arc};
 use tokio_util::sync::CancellationToken;
@@ -74,12 +74,8 @@ impl Rpc {
 impl Shared {
     /// A motion database that is ready.
     pub(crate) async fn motion_database(&self, id: Uuid) -> Result<MotionDatabaseFile, CallError> {
-        let sql = "SELECT id, name, version, store_key, blake3 FROM motion_databases
-                   WHERE id = $1 AND store_key IS NOT NULL";
-        let row: Option<(Uuid, String, i32, String, String)> =
-            sqlx::query_as(sql).bind(id).fetch_optional(&self.resources.pool).await?;
-        let (id, name, version, store_key, blake3) = row.ok_or(CallError::NoSuchDatabase(id))?;
-        Ok(MotionDatabaseFile { id, name, version, store_key, blake3, gplvm: None })
+        let found = library::motion_database::find(&self.resources.pool, id).await?;
+        found.ok_or(CallError::NoSuchDatabase(id))
     }
 }
 
@@ -112,8 +108,8 @@ fn solve(
         prior.database.skeleton().clone()
     } else {
         let read = formats::asf::read(skeleton_asf.as_bytes());
-        let in_file = |source| crate::InputError::File { file: "skeleton_asf".to_owned(), source };
-        read.map_err(in_file)?.value.skeleton
+        let in_file = FileError::in_file("skeleton_asf");
+        read.map_err(in_file).map_err(crate::InputError::from)?.value.skeleton
     };
     let points = control_points(&skeleton, trajectories.names()).map_err(crate::InputError::from)?;
     let session = Session::new(skeleton, points, trajectories)?;

@@ -1,28 +1,27 @@
 //! The files that people get of a person who was followed.
 
-use std::sync::Arc;
+use model::{Motion, PointTrajectories};
+use results::{Body, Kind};
 
-use body::Poses;
-use queue::JobError;
-use results::{
-    ResultFile, formats,
-    media_type::{CSV, GLB},
+use crate::{
+    csv,
+    finished::{Finished, poses},
 };
 
-use crate::{InputError, csv, finished::Finished};
+impl results::Finished for Finished {
+    const KIND: Kind = Kind::TRACKING;
+    const QUALITY: Option<fn(&Self) -> String> = Some(csv::quality);
+    const BODY: Option<fn(&Self) -> Body<'_>> = Some(|finished| Body {
+        model: &finished.model,
+        shape: &finished.shape,
+        poses: poses(&finished.tracked).into(),
+    });
 
-/// The motion in every format, the body, and how well each frame is known.
-pub(crate) fn files(finished: &Arc<Finished>) -> Vec<ResultFile> {
-    let mut files = formats(finished);
-    let moving = finished.clone();
-    files.push(ResultFile::new("body.glb", GLB, move || {
-        let poses = moving.poses();
-        let poses = Poses { poses: &poses, frame_rate: moving.frame_rate };
-        Ok::<_, InputError>(body::glb(&moving.model, &moving.shape, Some(poses))?)
-    }));
-    let known = finished.clone();
-    files.push(ResultFile::new("quality.csv", CSV, move || {
-        Ok::<_, JobError>(csv::quality(&known).into_bytes())
-    }));
-    files
+    fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    fn joints(&self) -> Option<&PointTrajectories> {
+        Some(&self.joints)
+    }
 }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use body::{BodyModel, Shape};
 use model::{Motion, PointTrajectories};
 use nalgebra::Vector3;
-use results::Kind;
 use tracking::{Chunk, Seam, Stage};
 
 use crate::InputError;
@@ -31,9 +30,9 @@ pub(crate) struct Finished {
     pub cameras: Vec<String>,
     /// frames a second
     pub frame_rate: f64,
-    motion: Motion,
+    pub motion: Motion,
     /// centres, missing where nobody was found
-    joints: PointTrajectories,
+    pub joints: PointTrajectories,
 }
 
 impl Finished {
@@ -58,25 +57,9 @@ impl Finished {
         let joints = PointTrajectories::new(names, frame_rate, positions.collect())?;
         Ok(Self { model, shape, tracked, meetings, cameras, frame_rate, motion, joints })
     }
-
-    /// The body's poses, shape `[frames][dof]`.
-    pub fn poses(&self) -> Vec<Vec<f64>> {
-        poses(&self.tracked)
-    }
 }
 
-fn poses(tracked: &Chunk) -> Vec<Vec<f64>> {
+/// The body's poses, shape `[frames][dof]`.
+pub(crate) fn poses(tracked: &Chunk) -> Vec<Vec<f64>> {
     tracked.frames.iter().map(|tracked| tracked.pose.clone()).collect()
-}
-
-impl results::Finished for Finished {
-    const KIND: Kind = Kind::Tracking;
-
-    fn motion(&self) -> &Motion {
-        &self.motion
-    }
-
-    fn joints(&self) -> Option<&PointTrajectories> {
-        Some(&self.joints)
-    }
 }

@@ -14,7 +14,7 @@ use service::{compute, objects};
 use tracking::{Chunk, Stage, hold_unseen, merge};
 
 use crate::{
-    InputError, Shared, export,
+    InputError, Shared,
     finished::{Finished, Meeting},
     report,
     track_job::{chunk_name, report_name},
@@ -40,7 +40,7 @@ impl Handler for MergeHandler {
         let packed = finished.clone();
         let tracked = compute::run(move || packed.tracked.to_bytes()).await.map_err(InputError::from)?;
         let tracked = objects::write(store, &context, TRACKED, BINARY, tracked).await?;
-        let written = results::write(store, &context, export::files(&finished), 0.2..0.95).await?;
+        let written = results::write(store, &context, results::formats(&finished), 0.2..0.95).await?;
         let merge = resources.job_report(&context, finished.tracked.frames.len());
         let run = report::run_json(resources.origin(&context), &session, &finished, &chunks, &merge)?;
         let run = results::write_one(store, &context, run).await?;

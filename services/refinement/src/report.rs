@@ -64,7 +64,7 @@ pub(crate) fn run_json(
     let timings = Timings::default()
         .one("plan", &session.plan)
         .all("cameras", session.cameras.iter().map(|camera| &camera.job))
-        .one("initialise", &session.fit_shape)
+        .one("fit_shape", &session.fit_shape)
         .all("chunks", chunks)
         .one("merge", merge)
         .speed(chunks);

@@ -6,7 +6,7 @@ use body::{LearnOptions, Learned, ScanOptions, ScanSet};
 use formats::archive::{self, Entry, Limits};
 use jobs::{
     InputFile,
-    body_model::{BodyModelName, BuildBodyModel},
+    body_model::{BuildBodyModel, VersionName},
     run_json::{RUN_JSON, RunReport, Timings},
 };
 use queue::{Handler, JobContext, JobError, Outcome};
@@ -169,7 +169,7 @@ fn contents(set: &ScanSet, learned: &Learned, files: &[InputFile]) -> Contents {
 
 #[derive(Debug, Clone)]
 struct Ready {
-    name: BodyModelName,
+    name: VersionName,
     stored: Stored,
     num_vertices: usize,
     num_components: usize,

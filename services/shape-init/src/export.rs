@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use body::{BodyModel, Poses, Shape};
+use body::{BodyModel, Shape};
 use model::{Image, Mesh, Motion};
 use queue::JobError;
 use results::{
-    Kind, ResultFile,
-    media_type::{BINARY, GLB, PNG},
+    Body, Kind, ResultFile,
+    media_type::{BINARY, PNG},
 };
 use shape_fit::Fit;
 
@@ -40,22 +40,16 @@ impl Finished {
 }
 
 impl results::Finished for Finished {
-    const KIND: Kind = Kind::Shape;
+    const KIND: Kind = Kind::SHAPE;
+    const BODY: Option<fn(&Self) -> Body<'_>> = Some(|finished| Body {
+        model: &finished.model,
+        shape: &finished.shape,
+        poses: finished.poses.as_slice().into(),
+    });
 
     fn motion(&self) -> &Motion {
         &self.motion
     }
-}
-
-/// The skeleton in its poses, in every format, and the skinned body.
-pub(crate) fn files(finished: Finished) -> Vec<ResultFile> {
-    let finished = Arc::new(finished);
-    let mut files = results::formats(&finished);
-    files.push(ResultFile::new("body.glb", GLB, move || {
-        let poses = Poses { poses: &finished.poses, frame_rate: finished.motion.frame_rate() };
-        Ok::<_, InputError>(body::glb(&finished.model, &finished.shape, Some(poses))?)
-    }));
-    files
 }
 
 /// A picture as a result.

@@ -104,8 +104,13 @@ fn calibration_file(files: &[InputFile]) -> Result<&InputFile, InputError> {
         _ => {
             let names: Vec<&str> = found.iter().map(|file| file.name.as_str()).collect();
             let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
-            Err(FileError::Count { role: FileRole::Calibration, found: found.len(), names, expected: "one" }
-                .into())
+            Err(FileError::Count {
+                role: FileRole::Calibration,
+                found: found.len(),
+                names,
+                expected: "one".to_owned(),
+            }
+            .into())
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use camera_jobs::views;
+use camera_jobs::{ShapeError, views};
 use jobs::inverse_kinematics::BodyDescription;
 use proto::v1::{self, MeshFormat, shape_init_server::ShapeInit};
 use service::{FileError, compute::Slots};
@@ -35,7 +35,7 @@ impl Rpc {
                 stature_m: request.stature_m,
                 mass_kg: request.mass_kg,
                 age_years: request.age_years,
-                sex: Some(request.sex.clone()),
+                sex: camera_jobs::sex(&request.sex).map_err(ShapeError::from)?,
             };
             let shape = camera_jobs::shape(&model, &described)?;
             let mesh = match request.format() {

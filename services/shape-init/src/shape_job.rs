@@ -189,7 +189,7 @@ async fn body(
             // those of the whole motion come later
             Vec::new()
         } else {
-            export::files(Finished::new(model, shape, &fits, frame_rate)?)
+            results::formats(&Arc::new(Finished::new(model, shape, &fits, frame_rate)?))
         };
         Ok((posed, mesh, report))
     });
@@ -210,7 +210,7 @@ fn run_json(
     let timings = Timings::default()
         .one("plan", &job.plan)
         .all("cameras", cameras.iter().map(|camera| &camera.job))
-        .one("initialise", report);
+        .one("fit_shape", report);
     let own = json!({ "cameras": cameras.iter().map(CameraReport::summary).collect::<Vec<_>>() });
     let run = RunReport { origin, warnings: &job.warnings, timings, frames: Some(frames), points: None };
     Ok(ResultFile::ready(RUN_JSON, JSON, run.to_json(&job.request, own)?))
@@ -231,25 +231,17 @@ fn end_frame(cameras: &[CameraReport], warnings: &mut Vec<String>) -> usize {
 
 /// Frames a second: as asked for, or as the videos say.
 fn frame_rate(parameters: &Parameters, cameras: &[CameraReport], warnings: &mut Vec<String>) -> f64 {
-    let rates = || cameras.iter().filter_map(|camera| camera.frame_rate);
     if let Some(asked) = parameters.frame_rate {
         return asked;
     }
-    let Some(rate) = rates().next() else {
+    jobs::multi_view::frame_rate(cameras, warnings).unwrap_or_else(|| {
         if parameters.track {
             warnings.push(format!(
                 "no file states the frame rate: {FRAME_RATE} frames a second are assumed; state another by --set frame_rate=…"
             ));
         }
-        return FRAME_RATE;
-    };
-    if let Some(other) = rates().find(|other| (other - rate).abs() > 0.01 * rate) {
-        warnings.push(format!(
-            "the videos have {rate:.3} and {other:.3} frames a second: frames are taken to be of the same moments all the same, \
-             and {rate:.3} is used; convert them to one rate"
-        ));
-    }
-    rate
+        FRAME_RATE
+    })
 }
 
 /// What a user should know of a fit that did not fail.

@@ -161,7 +161,10 @@ mod tests {
         assert_eq!(message, "frame 1 has 0 joints, expected 1");
         let whole = text.replace(r#", {"joints": []}"#, "");
         assert_eq!(from_json(whole.as_bytes()).unwrap().position(0, 0), Some(Vector3::new(1.0, 2.0, 3.0)));
-        let message = read_truth(Path::new("/dev/null")).unwrap_err().to_string();
-        assert!(message.contains("expected true joints"), "{message}");
+        let message = format!("{:#}", read_truth(Path::new("/dev/null")).unwrap_err());
+        assert!(
+            message.contains("/dev/null") && message.contains("expected .csv, .trc or .c3d"),
+            "{message}"
+        );
     }
 }

@@ -206,7 +206,8 @@ pub fn frame_rate(cameras: &[CameraReport], warnings: &mut Vec<String>) -> Optio
     let (first, rate) = known.next()?;
     if let Some((other, found)) = known.find(|(_, found)| (found - rate).abs() > 0.01 * rate) {
         warnings.push(format!(
-            "camera {other} has {found} frames a second, camera {first} {rate}: all are taken to have {rate}"
+            "camera {other} has {found} frames a second, camera {first} {rate}: all are taken to have {rate}; convert \
+             them to one rate"
         ));
     }
     Some(rate)

@@ -33,6 +33,7 @@ pub struct TrackingSession {
     /// what the plan took
     pub plan: JobReport,
     /// what it took to find the shape
+    // as sessions have it whose chunks older workers track
     #[serde(rename = "initialise")]
     pub fit_shape: JobReport,
     /// what was found of every camera

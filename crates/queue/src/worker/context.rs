@@ -100,11 +100,6 @@ impl JobContext {
         self.held.stop.cancelled().await;
     }
 
-    /// The token behind [`cancelled`](Self::cancelled), for work that takes one.
-    pub fn cancel_token(&self) -> CancellationToken {
-        self.held.stop.clone()
-    }
-
     /// `job.check()?` stops the handler when it is time to.
     ///
     /// # Errors

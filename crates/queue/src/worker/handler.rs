@@ -4,7 +4,7 @@ use futures::future::BoxFuture;
 use sqlx::PgConnection;
 
 use super::context::JobContext;
-use crate::{Artefact, ChildJob, Job, JobError};
+use crate::{Artefact, ChildJob, Job, JobError, OnComplete};
 
 /// Runs one kind of job.
 ///
@@ -47,11 +47,6 @@ impl<H: Handler> DynHandler for H {
 
 /// What is done before every attempt at a job, whatever its kind.
 pub(super) type BeforeAttempt = dyn Fn(JobContext) -> BoxFuture<'static, ()> + Send + Sync;
-
-/// SQL of a handler's own, run in the transaction that completes the job. It may be run again when that
-/// transaction could not be committed.
-pub type OnComplete =
-    dyn for<'c> Fn(&'c mut PgConnection) -> BoxFuture<'c, Result<(), JobError>> + Send + Sync;
 
 /// What a successful attempt leaves behind. All of it is stored in one transaction, or none.
 #[derive(Default)]

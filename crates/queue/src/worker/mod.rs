@@ -22,7 +22,7 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 pub use context::JobContext;
-pub use handler::{Handler, OnComplete, Outcome};
+pub use handler::{Handler, Outcome};
 
 use crate::{Job, RetryPolicy};
 use context::HeldJobs;

@@ -100,3 +100,11 @@ async fn what_is_to_be_done_before_an_attempt_is_done_before_every_one() {
     queue.wait_for_run(run_id, RunState::Succeeded).await;
     assert_eq!(begun.load(Ordering::SeqCst), 3);
 }
+
+#[tokio::test]
+async fn a_job_that_an_older_program_enqueues_by_a_former_name_gets_the_present_one() {
+    let queue = Queue::new().await;
+    let former = ChildJob { kind: "initialise-body", ..job(Chunk, json!(null)) };
+    let (_, ids) = queue.run(&[former]).await;
+    assert_eq!(queue.job(ids[0], "kind").await, "fit-shape");
+}

@@ -4,7 +4,7 @@ use axum::{
     http::{HeaderMap, header},
     response::{IntoResponse, Response},
 };
-use body::{Sex, Wanted, shipped};
+use body::{UnknownSex, Wanted, shipped};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
@@ -76,14 +76,8 @@ pub(super) async fn glb(
     Path(which): Path<String>,
     Query(query): Query<BodyQuery>,
 ) -> Result<Response> {
-    let sex = match query.sex.as_deref() {
-        None => None,
-        Some("female") => Some(Sex::Female),
-        Some("male") => Some(Sex::Male),
-        Some(other) => {
-            return Err(Error::Unprocessable(format!("sex is {other:?}, expected female or male")));
-        }
-    };
+    let sex = query.sex.as_deref().map(str::parse).transpose();
+    let sex = sex.map_err(|error: UnknownSex| Error::Unprocessable(error.to_string()))?;
     let wanted =
         Wanted { stature_m: query.stature_m, mass_kg: query.mass_kg, age_years: query.age_years, sex };
     let found: BodyModel = versioned::look(&by, &which, Latest::Ready).await?;

@@ -2,7 +2,7 @@
 
 use jobs::{
     InputFile,
-    body_model::{self, BodyModelName, BuildBodyModel},
+    body_model::{self, BuildBodyModel, VersionName},
 };
 use serde::Deserialize;
 use sqlx::PgConnection;
@@ -57,7 +57,7 @@ impl Build for NewBodyModelBuild {
         }
         let Version { id, name, version, .. } = row.version().clone();
         let payload = BuildBodyModel {
-            body_model: BodyModelName { id, name, version },
+            body_model: VersionName { id, name, version },
             files,
             components: self.components.unwrap_or(body::MAX_COMPONENTS),
             metres_per_unit: self.metres_per_unit,

@@ -1,8 +1,9 @@
 //! Runs by inverse kinematics: poses of a body whose measured points are reached.
 
+use body::UnknownSex;
 use formats::FileRole;
 use jobs::inverse_kinematics::{
-    BodyDescription, InverseKinematics, Method, RUN_KIND, SolveInverseKinematics,
+    BodyDescription, InverseKinematics, Method, RUN_KIND, Sex, SolveInverseKinematics,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -115,7 +116,7 @@ impl SessionRun for InverseKinematicsRun {
             )));
         }
         let choice = self.markers.into();
-        let how = InverseKinematics { choice, ..self.inverse_kinematics.resolve(solver) };
+        let how = InverseKinematics { choice, ..self.inverse_kinematics.resolve(solver)? };
         let session_id = on.session.id;
         if !solver.uses_images()
             && let Some(field) = self.cameras.first_given()?
@@ -152,10 +153,12 @@ impl InverseKinematicsRequest {
         if let Some(rate) = self.frame_rate.filter(|rate| !FRAME_RATES.contains(rate)) {
             return refuse(format!("frame_rate is {rate}, expected 1 to 1000"));
         }
-        if let Some(sex) = self.sex.as_deref().filter(|sex| !["female", "male"].contains(sex)) {
-            return refuse(format!("sex is {sex:?}, expected female or male"));
-        }
-        Ok(())
+        self.sex().map(drop)
+    }
+
+    fn sex(&self) -> Result<Option<Sex>> {
+        let sex = self.sex.as_deref().map(str::parse).transpose();
+        sex.map_err(|error: UnknownSex| Error::Unprocessable(error.to_string()))
     }
 
     fn solver(&self) -> Result<Option<Method>> {
@@ -185,8 +188,9 @@ impl InverseKinematicsRequest {
     }
 
     /// Everything resolved, but for points and markers.
-    fn resolve(self, solver: Method) -> InverseKinematics {
-        InverseKinematics {
+    fn resolve(self, solver: Method) -> Result<InverseKinematics> {
+        let sex = self.sex()?;
+        Ok(InverseKinematics {
             solver,
             steps: self.steps.unwrap_or(STEPS.1),
             frame_rate: self.frame_rate,
@@ -195,9 +199,9 @@ impl InverseKinematicsRequest {
                 stature_m: self.stature_m,
                 mass_kg: self.mass_kg,
                 age_years: self.age_years,
-                sex: self.sex,
+                sex,
             },
             ..InverseKinematics::default()
-        }
+        })
     }
 }

@@ -2,7 +2,7 @@
 
 use jobs::{
     InputFile,
-    motion_database::{self, MotionDatabaseName, PlanMotionDatabase},
+    motion_database::{self, PlanMotionDatabase, VersionName},
 };
 use serde::Deserialize;
 use sqlx::PgConnection;
@@ -74,7 +74,7 @@ impl Build for NewBuild {
         let base = base.as_ref();
         let Version { id, name, version, .. } = row.version().clone();
         let payload = PlanMotionDatabase {
-            motion_database: MotionDatabaseName { id, name, version },
+            motion_database: VersionName { id, name, version },
             base: base.map(MotionDatabase::ready).transpose()?,
             without,
             files,

@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{
-    noun::{Noun, Version, Versioned},
+    noun::{Noun, State, Version, Versioned},
     sql::sql,
     users::runs_that_use,
 };
@@ -89,7 +89,7 @@ impl Versioned for BodyModel {
                 id: Uuid::nil(),
                 name: SHIPPED.to_owned(),
                 version: 1,
-                state: "ready".to_owned(),
+                state: State::Ready,
                 build_run_id: None,
                 bytes: i64::try_from(shipped.bytes.len()).ok(),
                 blake3: Some(shipped.blake3.clone()),

@@ -41,6 +41,32 @@ pub(crate) struct Noun {
     pub prefix: fn(Uuid) -> Key,
 }
 
+/// How far a version is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, sqlx::Type)]
+#[serde(rename_all = "lowercase")]
+#[sqlx(type_name = "text", rename_all = "lowercase")]
+pub(crate) enum State {
+    /// collects files
+    Open,
+    /// its build is under way
+    Building,
+    /// it can be used
+    Ready,
+    /// its build failed; collects files again
+    Failed,
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Open => "open",
+            Self::Building => "building",
+            Self::Ready => "ready",
+            Self::Failed => "failed",
+        })
+    }
+}
+
 /// One version of one name.
 #[derive(Debug, Clone, Serialize, ToSchema, sqlx::FromRow)]
 pub(crate) struct Version {
@@ -53,8 +79,8 @@ pub(crate) struct Version {
     #[schema(example = 1)]
     pub version: i32,
     /// `open` (collects files), `building`, `ready`, or `failed` (collects files again)
-    #[schema(example = "ready")]
-    pub state: String,
+    #[schema(value_type = String, example = "ready")]
+    pub state: State,
     /// the run that builds or built it
     pub build_run_id: Option<Uuid>,
     /// size of what was built, bytes
@@ -73,7 +99,7 @@ pub(crate) struct Version {
 impl Version {
     /// Whether files may be added to it and taken from it, and it can be built.
     pub fn collects(&self) -> bool {
-        matches!(self.state.as_str(), "open" | "failed")
+        matches!(self.state, State::Open | State::Failed)
     }
 
     /// Whether it comes with the program.
@@ -129,10 +155,10 @@ pub(crate) trait Versioned: Item + Serialize + Sync + 'static {
     fn blake3(&self) -> Result<&str> {
         let version = self.version();
         version.blake3.as_deref().ok_or_else(|| {
-            let what_to_do = match version.state.as_str() {
-                "open" => format!("upload {} to it and build it", Self::NOUN.sources),
-                "building" => "wait for its build".to_owned(),
-                _ => "see the error of its build".to_owned(),
+            let what_to_do = match version.state {
+                State::Open => format!("upload {} to it and build it", Self::NOUN.sources),
+                State::Building => "wait for its build".to_owned(),
+                State::Failed | State::Ready => "see the error of its build".to_owned(),
             };
             Error::Conflict(format!("{} is {}, expected ready: {what_to_do}", self.title(), version.state))
         })

@@ -7,6 +7,7 @@ use inverse_kinematics::{Figure, Method};
 use jobs::inverse_kinematics::BodyDescription;
 use kinematics::control_points;
 use proto::v1::{self, InverseKinematicsMethod as Wire, solve_inverse_kinematics_request::Performer};
+use service::FileError;
 use tokio_util::sync::CancellationToken;
 
 use super::{MAX_POINTS, MAX_STEPS};
@@ -129,7 +130,7 @@ fn figure(
                 stature_m: body.stature_m,
                 mass_kg: body.mass_kg,
                 age_years: body.age_years,
-                sex: Some(body.sex.clone()),
+                sex: camera_jobs::sex(&body.sex)?,
             };
             let shape = camera_jobs::shape(model, &described)?;
             let skeleton = model.skeleton(&shape).map_err(InputError::from)?;
@@ -137,8 +138,12 @@ fn figure(
             Figure::body(model, &shape, &points)
         }
         (Some(Performer::SkeletonAsf(text)), _) => {
-            let in_file = |source| InputError::File { file: "skeleton_asf".to_owned(), source };
-            let skeleton = formats::asf::read(text.as_bytes()).map_err(in_file)?.value.skeleton;
+            let in_file = FileError::in_file("skeleton_asf");
+            let skeleton = formats::asf::read(text.as_bytes())
+                .map_err(in_file)
+                .map_err(InputError::from)?
+                .value
+                .skeleton;
             let points = control_points(&skeleton, names).map_err(InputError::from)?;
             Figure::skeleton(&Arc::clone(&skeleton), &points)
         }

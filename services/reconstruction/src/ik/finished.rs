@@ -5,7 +5,6 @@ use std::sync::Arc;
 use body::{BodyModel, Shape};
 use inverse_kinematics::sequence::Solved;
 use model::Motion;
-use results::Kind;
 
 /// All frames solved.
 pub(super) struct Finished {
@@ -20,12 +19,4 @@ pub(super) struct Finished {
     pub frame_rate: f64,
     pub motion: Motion,
     pub warnings: Vec<String>,
-}
-
-impl results::Finished for Finished {
-    const KIND: Kind = Kind::InverseKinematics;
-
-    fn motion(&self) -> &Motion {
-        &self.motion
-    }
 }

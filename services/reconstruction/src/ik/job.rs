@@ -19,7 +19,6 @@ use service::compute;
 use super::{
     MAX_STEPS,
     evidence::{self, Frames},
-    export,
     finished::Finished,
     report,
 };
@@ -80,7 +79,7 @@ impl Handler for IkHandler {
         context.check()?;
         let finished = Arc::new(compute::run(move || problem.finish(solved)).await?);
         let written =
-            results::write(&resources.store, &context, export::files(&finished), 0.95..0.99).await?;
+            results::write(&resources.store, &context, results::formats(&finished), 0.95..0.99).await?;
         let job = resources.job_report(&context, finished.solved.len());
         let run = report::run_json(resources.origin(&context), &request, &cameras, &finished, &job)?;
         let run = results::write_one(&resources.store, &context, run).await?;

@@ -1,11 +1,11 @@
 //! What a stream is to start with: everything that is looked up, read and checked before its first frame.
 
 use super::LiveRpc;
-use crate::{error::CallError, priors::Prior};
+use crate::{InputError, error::CallError, priors::Prior};
 use model::Skeleton;
 use motion_db::ControlTable;
 use proto::v1::{self, LiveDelivery};
-use service::compute;
+use service::{FileError, compute};
 use sparse::{Method, Parameters, Session, control_points};
 use std::sync::Arc;
 
@@ -90,8 +90,8 @@ fn skeleton(asf: &str, borrowed: &Arc<Skeleton>) -> Result<Arc<Skeleton>, CallEr
     if asf.is_empty() {
         return Ok(borrowed.clone());
     }
-    let in_file = |source| crate::InputError::File { file: "skeleton_asf".to_owned(), source };
-    Ok(formats::asf::read(asf.as_bytes()).map_err(in_file)?.value.skeleton)
+    let in_file = FileError::in_file("skeleton_asf");
+    Ok(formats::asf::read(asf.as_bytes()).map_err(in_file).map_err(InputError::from)?.value.skeleton)
 }
 
 fn parameters(json: &str) -> Result<Parameters, CallError> {
