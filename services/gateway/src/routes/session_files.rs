@@ -29,8 +29,9 @@ use crate::{
 #[into_params(parameter_in = Query)]
 pub(crate) struct PutQuery {
     /// guessed from the name when left out: `.asf` skeleton; `.csv`, `.trc`, `.c3d` control points; `.amc`, `.bvh`
-    /// ground truth; `.toml`, `.json`, `.yml`, `.xml`, `.qca.txt` calibration; `.mp4`, `.mov`, `.avi`, `.mkv`, `.webm` video;
-    /// `.png`, `.jpg` plate; archives masks, or images or plates if their name says so
+    /// ground truth; `.toml`, `.json`, `.yml`, `.xml`, `.qca.txt` calibration; `.mp4`, `.mov`, `.m4v`,
+    /// `.avi`, `.mkv`, `.webm` video; `.png`, `.jpg` plate; archives masks, or images or plates
+    /// if their name says so
     #[param(schema_with = files::role_schema)]
     role: Option<FileRole>,
 }
