@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# References that code and documents make must lead somewhere: every docs/NAME.md, every docs/NAME.md#section and every
-# `crates/…` or `services/…` path that is named exists, and nothing refers to documents or numberings that are not in the repository. With --self-test it first shows
-# that it finds what it looks for.
+# References that code and documents make must lead somewhere: every docs/NAME.md, every docs/NAME.md#section
+# and every `crates/…` or `services/…` path that is named exists, and nothing refers to documents or
+# numberings that are not in the repository. With --self-test it first shows that it finds what it looks for.
 set -euo pipefail
 shopt -s inherit_errexit
 cd "$(dirname "$0")/.."
 
 # Short names of papers and sections of notes that only their authors have; docs/papers.md is what may be named.
-dangling='method(\.md)? §|design(\.md)? §|\bmends? [0-9]|\bMM (eq\.|§)|\bIK eq\.|\bIBIK\b|\bLR(-zh)?,? (eq\.|table|[0-9])|\bLR-zh\b'
+dangling='method(\.md)? §|design(\.md)? §|\bmends? [0-9]|\bMM (eq\.|§)|\bIK eq\.|\bIBIK\b'
+dangling+='|\bLR(-zh)?,? (eq\.|table|[0-9])|\bLR-zh\b|\(LR\)|\b[Tt]he Chinese paper\b'
 
 # Prints the anchors of the headings of a Markdown file.
 anchors() {
@@ -62,6 +63,8 @@ self_test() {
 /// A Parzen density (MM eq. 15)
 /// (LR eq. 4-10)
 /// LR-zh, table 1
+/// table 1 of Mousas et al. (LR)
+/// Frames a second that the Chinese paper prints
 /// see `crates/no-such-crate/src/lib.rs`
 WRONG
     printf '/// (docs/papers.md#local-regression, eq. 10; docs/papers.md; `crates/model`)\n' >"$dir/lib.rs"

@@ -9,9 +9,9 @@ const LEAST_PIVOT: f64 = 1e-12;
 /// Local regression in its dual form (docs/papers.md#local-regression, eq. 4–10, changed as said there).
 ///
 /// One factorisation of the K×K Gram matrix serves all D targets (docs/papers.md#dual-form). The projected
-/// regression of eq. 5–9 has rank one and collapses to weighted least squares, which needs a ridge because K is
-/// smaller than the window (docs/papers.md#ridge); so that is what is computed: with centred inputs `X̃ = √ω (x − x̄)` and
-/// targets `Ỹ = √ω (y − ȳ)`,
+/// regression (docs/papers.md#ridge, eq. 5–9) has rank one and collapses to weighted least squares, which
+/// needs a ridge because K is smaller than the window; so that is what is computed: with centred inputs
+/// `X̃ = √ω (x − x̄)` and targets `Ỹ = √ω (y − ȳ)`,
 ///
 /// ```text
 /// G = X̃ X̃ᵀ + λ I,   ŷ = ȳ + (x_q − x̄)ᵀ X̃ᵀ G⁻¹ Ỹ,   e_k = (G⁻¹ Ỹ)_k / (G⁻¹)_kk

@@ -16,7 +16,8 @@ use sparse::{FramePart, Parameters, Reconstructor, Session, control_points};
 
 use crate::motions;
 
-/// Frames a second that the Chinese paper prints for windows of 1 to 4 frames (table 1; one core of 2.8 GHz).
+/// Frames a second that the paper prints for windows of 1 to 4 frames, on one core of 2.8 GHz
+/// (docs/papers.md#sparse-constraints, table 1).
 const PAPER: [f64; 4] = [84.0, 59.0, 34.0, 20.0];
 /// Parts of a frame, in the order of the table.
 const PARTS: [(&str, FramePart); 5] = [
