@@ -7,9 +7,9 @@
 //! ```
 //!
 //! The plan reads the calibration and finds out whose file is whose. One job a camera streams its frames and leaves packed
-//! silhouettes, ten seconds an artefact, with what was found of their quality. `fit-shape` fits a body to the first
-//! frames and enqueues the jobs that follow the person through all of them, which the refinement service takes; what they
-//! found is drawn over what each camera saw.
+//! silhouettes, 600 frames an artefact, with what was found of their quality. `fit-shape` fits a body to the
+//! first frames and enqueues the jobs that follow the person through all of them, which the refinement
+//! service takes; what they found is drawn over what each camera saw.
 
 mod build_job;
 mod children;
