@@ -193,7 +193,7 @@ fn one_camera_is_enough_and_none_too() -> Result<()> {
     refused(json!({ "inverse_kinematics": {}, "motion_database": "walks" }), "but of sparse runs")?;
     refused(
         json!({ "inverse_kinematics": {}, "cameras": ["cam1"] }),
-        "cameras is for runs that look at cameras",
+        "cameras is for runs that use cameras",
     )?;
     // what only the model knows ends the run, with words
     let run = api.start_run(&session, &json!({ "inverse_kinematics": { "stature_m": 4.0 } }))?;

@@ -66,7 +66,8 @@ fn versions_are_counted_and_found_by_id_name_and_version() -> Result<()> {
         for name in ["", "a/b", "a@1", "-a", "018f3f4e-0000-7000-8000-000000000000", &"a".repeat(65)] {
             let refused = api.post(path, &json!({ "name": name }))?;
             assert_eq!(refused.status, 422, "{name:?}");
-            assert!(detail(&refused).starts_with(&format!("{} name", noun.name)), "{}", detail(&refused));
+            let said = format!("{name:?} is not a valid {} name", noun.name);
+            assert!(detail(&refused).starts_with(&said), "{}", detail(&refused));
         }
         assert_eq!(api.post(path, &json!({"name": "a", "colour": "red"}))?.status, 422);
         Ok(())
