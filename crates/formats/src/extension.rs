@@ -1,8 +1,10 @@
+use crate::archive::without_compression;
+
 /// What a file's name tells about its format: its extension in lower case, without `.zst` or `.gz` behind it; empty if there is
 /// none.
 pub(crate) fn extension(name: &str) -> String {
     let lower = name.to_ascii_lowercase();
-    let inner = lower.strip_suffix(".zst").or(lower.strip_suffix(".gz")).unwrap_or(&lower);
+    let inner = without_compression(&lower);
     let extension = match inner.rsplit_once('.') {
         _ if inner.ends_with(".qca.txt") => "qca.txt",
         Some((_, extension)) => extension,

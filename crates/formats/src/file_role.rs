@@ -37,7 +37,6 @@ const PICTURE: [&str; 3] = ["png", "jpg", "jpeg"];
 const ARCHIVE: [&str; 4] = ["zip", "tar", "tgz", "tzst"];
 /// The same as people write them.
 const ARCHIVES: [&str; 4] = ["zip", "tar", "tar.gz", "tar.zst"];
-const MOTION: [&str; 3] = ["asf", "amc", "bvh"];
 const SCAN: [&str; 5] = ["obj", "ply", "npy", "json", "csv"];
 
 impl FileRole {
@@ -110,14 +109,14 @@ impl FileRole {
     /// The endings of files that can have this role in a session, as a sentence has them: `.csv, .trc or .c3d`.
     pub fn endings(self) -> String {
         let extensions: Vec<&str> = match self {
-            Self::Skeleton => vec!["asf", "bvh"],
+            Self::Skeleton => SkeletonFormat::extensions().into(),
             Self::ControlPoints => PointsFormat::extensions().into(),
-            Self::GroundTruth => vec!["amc", "bvh"],
+            Self::GroundTruth => MotionFormat::extensions().into(),
             Self::Calibration => CALIBRATION.into(),
             Self::Video => VIDEO.into(),
             Self::Images | Self::Masks => ARCHIVES.into(),
             Self::Plate => [&PICTURE[..], &ARCHIVES].concat(),
-            Self::Motion => [&MOTION[..], &ARCHIVES].concat(),
+            Self::Motion => [&motion_extensions()[..], &ARCHIVES].concat(),
             Self::Scans => [&SCAN[..], &ARCHIVES].concat(),
         };
         let dotted: Vec<String> = extensions.iter().map(|extension| format!(".{extension}")).collect();
@@ -129,8 +128,8 @@ impl FileRole {
 
     /// Whether motion databases are built from files of that name.
     pub fn is_motion_file(name: &str) -> bool {
-        let extension = extension(name);
-        MOTION.contains(&extension.as_str()) || ARCHIVE.contains(&extension.as_str())
+        let is_motion = MotionFormat::from_name(name).is_some() || SkeletonFormat::from_name(name).is_some();
+        is_motion || ARCHIVE.contains(&extension(name).as_str())
     }
 
     /// Whether body models are learned from files of that name.
@@ -138,6 +137,13 @@ impl FileRole {
         let extension = extension(name);
         SCAN.contains(&extension.as_str()) || ARCHIVE.contains(&extension.as_str())
     }
+}
+
+/// Extensions of the files, no archives, that motion databases are built from: skeletons and motion.
+fn motion_extensions() -> Vec<&'static str> {
+    let motion = MotionFormat::extensions();
+    let skeletons = SkeletonFormat::extensions().into_iter().filter(|extension| !motion.contains(extension));
+    skeletons.chain(motion).collect()
 }
 
 impl fmt::Display for FileRole {
@@ -194,6 +200,8 @@ mod tests {
     #[test]
     fn files_with_the_endings_of_a_role_can_have_it() {
         assert_eq!(FileRole::ControlPoints.endings(), ".csv, .trc or .c3d");
+        let motion = ".asf, .amc, .bvh, .zip, .tar, .tar.gz or .tar.zst";
+        assert_eq!(FileRole::Motion.endings(), motion);
         for role in FileRole::ALL {
             let endings = role.endings().replace(" or ", ", ");
             for ending in endings.split(", ") {

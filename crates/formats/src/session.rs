@@ -85,13 +85,22 @@ pub enum SkeletonFormat {
 }
 
 impl SkeletonFormat {
+    /// All of them, with the extensions of their files.
+    const ALL: [(Self, &str); 2] = [(Self::Asf, "asf"), (Self::Bvh, "bvh")];
+
     /// That of a file of that name.
     pub fn from_name(name: &str) -> Option<Self> {
-        match extension(name).as_str() {
-            "asf" => Some(Self::Asf),
-            "bvh" => Some(Self::Bvh),
-            _ => None,
-        }
+        Self::from_extension(&extension(name))
+    }
+
+    /// That of a file with that extension, in upper or lower case.
+    pub(crate) fn from_extension(extension: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|(_, own)| own.eq_ignore_ascii_case(extension)).map(|(format, _)| format)
+    }
+
+    /// The extensions of all formats.
+    pub(crate) fn extensions() -> [&'static str; Self::ALL.len()] {
+        Self::ALL.map(|(_, extension)| extension)
     }
 
     /// Reads the file, unpacked. A BVH, which says nothing of it, is taken to have the unit of the CMU library.
@@ -121,12 +130,37 @@ pub enum MotionFormat {
 }
 
 impl MotionFormat {
+    /// All of them, with the extensions of their files.
+    const ALL: [(Self, &str); 2] = [(Self::Amc, "amc"), (Self::Bvh, "bvh")];
+
     /// That of a file of that name.
     pub fn from_name(name: &str) -> Option<Self> {
-        match extension(name).as_str() {
-            "amc" => Some(Self::Amc),
-            "bvh" => Some(Self::Bvh),
-            _ => None,
+        Self::from_extension(&extension(name))
+    }
+
+    /// That of a file with that extension, in upper or lower case.
+    pub(crate) fn from_extension(extension: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|(_, own)| own.eq_ignore_ascii_case(extension)).map(|(format, _)| format)
+    }
+
+    /// The extensions of all formats.
+    pub(crate) fn extensions() -> [&'static str; Self::ALL.len()] {
+        Self::ALL.map(|(_, extension)| extension)
+    }
+
+    /// Whether its files say what skeleton the motion is on; else that is in a file beside them.
+    pub fn has_own_skeleton(self) -> bool {
+        match self {
+            Self::Amc => false,
+            Self::Bvh => true,
+        }
+    }
+
+    /// Reads the file, unpacked, of a motion with its own skeleton; `None` of one without.
+    pub(crate) fn read_alone(self, bytes: &[u8], bvh: &BvhOptions) -> Option<Result<Read<Motion>>> {
+        match self {
+            Self::Amc => None,
+            Self::Bvh => Some(bvh::read(bytes, bvh)),
         }
     }
 
@@ -142,8 +176,8 @@ impl MotionFormat {
         seconds: f64,
         options: &Options,
     ) -> Result<Read<Motion>> {
-        if self == Self::Bvh {
-            return bvh::read(bytes, &options.bvh);
+        if let Some(read) = self.read_alone(bytes, &options.bvh) {
+            return read;
         }
         let Read { value, warnings } = amc::read(bytes, skeleton, AMC_FRAME_RATE)?;
         let stated = amc::stated_frame_rate(bytes);

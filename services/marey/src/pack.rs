@@ -6,7 +6,10 @@ use std::{
 };
 
 use anyhow::{Context, bail};
-use formats::motion_files::is_motion_file;
+use formats::{
+    archive::without_compression,
+    motion_files::{FileUse, is_motion_file},
+};
 
 const ARCHIVES: [&str; 6] = [".zip", ".tar", ".tar.gz", ".tgz", ".tar.zst", ".tzst"];
 
@@ -70,7 +73,8 @@ pub fn pack(name: &str, paths: &[PathBuf]) -> anyhow::Result<Vec<Upload>> {
 /// Motions in pieces that a server takes; in each all that tells of motions, skeletons and indices.
 fn pieces(files: Vec<(PathBuf, PathBuf)>) -> anyhow::Result<Vec<Vec<(PathBuf, PathBuf)>>> {
     let is_motion = |(_, name): &(PathBuf, PathBuf)| {
-        has_extension(without_compression(&name.to_string_lossy()), &[".amc", ".bvh"])
+        let file = name.file_name().map(|n| n.to_string_lossy()).unwrap_or_default();
+        matches!(FileUse::from_name(without_compression(&file)), FileUse::Motion(_))
     };
     let (motions, support): (Vec<_>, Vec<_>) = files.into_iter().partition(is_motion);
     let mut pieces: Vec<Vec<(PathBuf, PathBuf)>> = Vec::new();
@@ -103,10 +107,6 @@ fn common_folder(files: &[PathBuf]) -> PathBuf {
         .find(|above| folders().all(|folder| folder.starts_with(above)))
         .unwrap_or(Path::new(""))
         .to_owned()
-}
-
-fn without_compression(name: &str) -> &str {
-    name.strip_suffix(".zst").or(name.strip_suffix(".gz")).unwrap_or(name)
 }
 
 fn has_extension(name: &str, extensions: &[&str]) -> bool {

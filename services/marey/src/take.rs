@@ -8,7 +8,7 @@ use std::{
 use anyhow::Context;
 use formats::{
     archive::{self, Entry, Limits},
-    motion_files,
+    motion_files::{self, FileUse, Pairing},
 };
 use model::Motion;
 
@@ -43,24 +43,29 @@ impl Take {
     pub fn find_all(folder: &Path) -> anyhow::Result<Vec<Self>> {
         let mut files = Vec::new();
         pack::collect(folder, folder, &mut files)?;
-        let indices: Vec<PathBuf> = files
-            .iter()
-            .map(|(path, _)| path.clone())
-            .filter(|path| kind(path).as_deref() == Some("csv"))
-            .collect();
-        let skeletons: Vec<&PathBuf> =
-            files.iter().map(|(path, _)| path).filter(|path| kind(path).as_deref() == Some("asf")).collect();
+        let mut files: Vec<(String, PathBuf)> =
+            files.into_iter().map(|(path, inner)| (plain_name(&inner), path)).collect();
+        files.sort();
+        let is_index = |name: &str| FileUse::from_name(name) == FileUse::Index;
+        let is_skeleton = |name: &str| matches!(FileUse::from_name(name), FileUse::Skeleton(_));
+        let indices: Vec<&PathBuf> =
+            files.iter().filter(|(name, _)| is_index(name)).map(|(_, path)| path).collect();
+        let skeletons: Vec<&(String, PathBuf)> = files.iter().filter(|(name, _)| is_skeleton(name)).collect();
+        // as a motion database built from the folder pairs them
+        let pairing = Pairing::new(skeletons.iter().map(|(name, _)| name.as_str()));
         let mut takes: Vec<Self> = files
             .iter()
-            .filter_map(|(path, _)| {
-                let skeleton = match kind(path)?.as_str() {
-                    "bvh" => None,
-                    "amc" => Some(skeleton_of(path, &skeletons)?.clone()),
-                    _ => return None,
+            .filter_map(|(name, path)| {
+                let FileUse::Motion(format) = FileUse::from_name(name) else { return None };
+                let skeleton = if format.has_own_skeleton() {
+                    None
+                } else {
+                    Some(skeletons[pairing.skeleton_of(name)?].1.clone())
                 };
-                let beside = |index: &&PathBuf| index.parent().is_some_and(|folder| path.starts_with(folder));
-                let indices = indices.iter().filter(beside).cloned().collect();
-                Some(Self { name: stem(path), motion: path.clone(), skeleton, indices })
+                let beside =
+                    |index: &&&PathBuf| index.parent().is_some_and(|folder| path.starts_with(folder));
+                let indices = indices.iter().filter(beside).map(|index| index.to_path_buf()).collect();
+                Some(Self { name: stem(name).to_owned(), motion: path.clone(), skeleton, indices })
             })
             .collect();
         takes.sort_by(|a, b| a.name.cmp(&b.name));
@@ -92,32 +97,15 @@ impl Take {
     }
 }
 
-/// The performer's: the ASF whose name is the take's up to `_`, or the only one in its folder.
-fn skeleton_of<'a>(motion: &Path, skeletons: &[&'a PathBuf]) -> Option<&'a PathBuf> {
-    let beside: Vec<&PathBuf> = skeletons.iter().copied().filter(|s| s.parent() == motion.parent()).collect();
-    let name = stem(motion);
-    let performer = name.split('_').next().unwrap_or_default();
-    beside
-        .iter()
-        .find(|skeleton| stem(skeleton) == performer)
-        .or(if beside.len() == 1 { beside.first() } else { None })
-        .copied()
+/// The name without folders and ending.
+fn stem(name: &str) -> &str {
+    let file = name.rsplit_once('/').map_or(name, |(_, file)| file);
+    file.rsplit_once('.').map_or(file, |(stem, _)| stem)
 }
 
-/// `asf`, `amc` or `bvh`, whatever it is compressed with.
-fn kind(path: &Path) -> Option<String> {
-    let name = plain_name(path);
-    name.rsplit_once('.').map(|(_, extension)| extension.to_ascii_lowercase())
-}
-
-fn stem(path: &Path) -> String {
-    let name = plain_name(path);
-    name.rsplit_once('.').map_or(name.clone(), |(stem, _)| stem.to_owned())
-}
-
+/// The name with its folders, whatever it is compressed with.
 fn plain_name(path: &Path) -> String {
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    name.strip_suffix(".zst").or(name.strip_suffix(".gz")).map_or(name.clone(), str::to_owned)
+    archive::without_compression(&path.to_string_lossy()).to_owned()
 }
 
 fn unpacked(path: &Path) -> anyhow::Result<Entry> {

@@ -8,34 +8,6 @@ use formats::{
 use motion_db::Clip;
 use queue::JobError;
 
-/// What an unpacked file is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Use {
-    /// A motion.
-    Motion,
-    /// Tells of motions: a skeleton, an `index.csv`.
-    Support,
-    /// Nothing.
-    None,
-}
-
-impl Use {
-    /// By name; what systems hide in archives is of no use.
-    pub fn from_name(name: &str) -> Self {
-        let lower = name.to_ascii_lowercase();
-        let (folder, file) = lower.rsplit_once('/').unwrap_or(("", &lower));
-        if file.starts_with('.') || folder.split('/').any(|f| f.starts_with('.') || f == "__macosx") {
-            return Self::None;
-        }
-        match file.rsplit_once('.') {
-            Some((_, "amc" | "bvh")) => Self::Motion,
-            Some((_, "asf")) => Self::Support,
-            Some(("index", "csv")) => Self::Support,
-            _ => Self::None,
-        }
-    }
-}
-
 /// Unpacks a file. Members of an archive lie in a folder with its name, so that those of two archives don't mix.
 ///
 /// # Errors
@@ -142,24 +114,6 @@ mod tests {
         assert_eq!(names("a.zip", &["16/16.asf", "x.bvh"]), ["a.zip/16/16.asf", "a.zip/x.bvh"]);
         assert_eq!(names("16.asf", &["16.asf"]), ["16.asf"]);
         assert_eq!(names("16_15.amc.zst", &["16_15.amc"]), ["16_15.amc"]);
-    }
-
-    #[test]
-    fn files_are_told_apart_by_name() {
-        for (name, expected) in [
-            ("a.zip/16/16_15.AMC", Use::Motion),
-            ("x.bvh", Use::Motion),
-            ("16.asf", Use::Support),
-            ("a/INDEX.csv", Use::Support),
-            ("a/other.csv", Use::None),
-            ("__MACOSX/16_15.amc", Use::None),
-            ("a/._16_15.amc", Use::None),
-            ("a/.git/x.amc", Use::None),
-            ("amc", Use::None),
-            ("", Use::None),
-        ] {
-            assert_eq!(Use::from_name(name), expected, "{name}");
-        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The job that divides the files of a motion database into parts, and decides the coordinates that all parts have.
 
-use crate::inputs::{self, Reader, Use};
-use formats::archive::Entry;
+use crate::inputs::{self, Reader};
+use formats::{archive::Entry, motion_files::FileUse};
 use jobs::{
     Object,
     motion_database::{BuildMotionDatabase, ImportMotion, MotionDatabaseFile, PlanMotionDatabase},
@@ -122,9 +122,9 @@ impl PlanHandler {
     }
 
     async fn place(&self, context: &JobContext, divided: &mut Divided, entry: Entry) -> Result<(), JobError> {
-        match Use::from_name(&entry.name) {
-            Use::None => {}
-            Use::Support => {
+        match FileUse::from_name(&entry.name) {
+            FileUse::None => {}
+            FileUse::Skeleton(_) | FileUse::Index => {
                 divided.support_bytes += entry.bytes.len();
                 if divided.support_bytes > MAX_SUPPORT_BYTES {
                     let message = format!(
@@ -136,7 +136,7 @@ impl PlanHandler {
                 }
                 divided.skeletons.push(entry);
             }
-            Use::Motion => {
+            FileUse::Motion(_) => {
                 let bytes = entry.bytes.len();
                 let (part, index) = (divided.parts.len(), divided.open.len());
                 divided.motions.push(Place { part, index, bytes });

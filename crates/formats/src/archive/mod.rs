@@ -12,6 +12,8 @@ use crate::{Error, Result};
 use budget::Budget;
 use decompress::Compression;
 
+pub use name::without_compression;
+
 /// How much an archive may unpack to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
@@ -89,9 +91,9 @@ pub fn entries_where(
             read.map_err(|e| stream.error(compression.name(), &e))?;
             if tar::is_header(&head) {
                 tar::read(head.as_slice().chain(unpacked), &stream, &mut unpacking)?;
-            } else if unpacking.takes_next(name::without_compression(name).as_bytes())? {
+            } else if unpacking.takes_next(without_compression(name).as_bytes())? {
                 unpacked.read_to_end(&mut head).map_err(|e| stream.error(compression.name(), &e))?;
-                unpacking.push(name::without_compression(name).as_bytes(), head);
+                unpacking.push(without_compression(name).as_bytes(), head);
             }
         }
         Kind::Plain => {
@@ -161,7 +163,7 @@ impl<'a> Unpacking<'a> {
             None => self.push(member, bytes),
             Some(compression) => {
                 let unpacked = self.read(compression.name(), member, compression.reader(&bytes))?;
-                self.push(name::without_compression(&String::from_utf8_lossy(member)).as_bytes(), unpacked);
+                self.push(without_compression(&String::from_utf8_lossy(member)).as_bytes(), unpacked);
             }
         }
         Ok(())

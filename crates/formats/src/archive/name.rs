@@ -5,8 +5,8 @@ pub(super) fn shown(name: &[u8]) -> String {
     quote(name)
 }
 
-/// Name without the ending of its compression.
-pub(super) fn without_compression(name: &str) -> &str {
+/// A file's name without the ending of its compression, `.zst` or `.gz`.
+pub fn without_compression(name: &str) -> &str {
     let is_ending = |ending: &str| {
         name.len() > ending.len()
             && name.is_char_boundary(name.len() - ending.len())

@@ -1,9 +1,10 @@
 use std::collections::HashMap;
 
-use super::Path;
+use super::{FileUse, Path};
 use crate::{
     Error, Result,
-    archive::Entry,
+    archive::{Entry, without_compression},
+    session::MotionFormat,
     text::{Lines, finite, name, quote},
 };
 
@@ -26,7 +27,7 @@ impl<'e> Indices<'e> {
     pub(super) fn read(files: &[(Path<'e>, &'e Entry)]) -> Result<Self> {
         let mut list = Vec::new();
         for (path, entry) in files {
-            if path.has_extension("csv") && path.stem.eq_ignore_ascii_case("index") {
+            if path.file_use() == FileUse::Index {
                 let rows = rows(&entry.bytes).map_err(|e| e.in_file(&entry.name))?;
                 list.push((path.folder, rows));
             }
@@ -78,8 +79,11 @@ fn rows(bytes: &[u8]) -> Result<HashMap<String, Row>> {
 /// `16/16_15.amc.zst` is `16_15`.
 fn stem(file: &str) -> &str {
     let file = file.rsplit('/').next().unwrap_or(file);
-    let file = file.strip_suffix(".zst").or(file.strip_suffix(".gz")).unwrap_or(file);
-    file.strip_suffix(".amc").or(file.strip_suffix(".bvh")).unwrap_or(file)
+    let file = without_compression(file);
+    match file.rsplit_once('.') {
+        Some((stem, extension)) if MotionFormat::from_extension(extension).is_some() => stem,
+        _ => file,
+    }
 }
 
 /// Cells of a line of CSV; in quotes a comma is text; quotes themselves are dropped.

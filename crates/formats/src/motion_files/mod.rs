@@ -1,17 +1,25 @@
 //! From the files of an archive to motions: AMC with its ASF, and BVH.
 
+mod file_use;
 mod index;
 mod pairing;
 mod path;
-
-use std::{cell::OnceCell, sync::Arc};
+mod skeletons;
 
 use model::Motion;
 
-use crate::{Error, Place, Read, Result, Warning, amc, archive::Entry, asf, bvh, text::Names};
+use crate::{
+    Error, Place, Read, Result, Warning, amc,
+    archive::{Entry, without_compression},
+    bvh,
+    text::Names,
+};
 use index::Indices;
-use pairing::Skeletons;
 use path::Path;
+use skeletons::Skeletons;
+
+pub use file_use::FileUse;
+pub use pairing::Pairing;
 
 /// What to do with a file that can't be read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -57,17 +65,12 @@ pub struct MotionFile {
 /// Whether a file of that name is one that [`clips`] makes something of: motion, a skeleton or an index, also packed by
 /// Zstandard or gzip.
 pub fn is_motion_file(name: &str) -> bool {
-    let unpacked =
-        name.strip_suffix(".zst").or(name.strip_suffix(".gz")).unwrap_or(name).to_ascii_lowercase();
-    name.eq_ignore_ascii_case("index.csv")
-        || [".asf", ".amc", ".bvh"].iter().any(|end| unpacked.ends_with(end))
+    FileUse::from_name(without_compression(name)) != FileUse::None
 }
 
 /// The motions of all AMC and BVH files, in the order of their paths.
 ///
-/// An AMC file belongs to the ASF file whose name is the longest beginning of its own up to a `_` (`16_15.amc` to
-/// `16.asf`), first in the same folder, then elsewhere; else to the only ASF file of its folder, else to the only one.
-/// Files named `index.csv` may give the columns `file` or `trial`, and `action`, `subject` and `fps` (of AMC).
+/// AMC files are on the skeletons that [`Pairing`] finds for them. Files named `index.csv` may give the columns `file` or `trial`, and `action`, `subject` and `fps` (of AMC).
 /// Hidden files and all others are left alone.
 ///
 /// # Errors
@@ -82,15 +85,12 @@ pub fn clips(entries: &[Entry], options: &Options) -> Result<Read<Vec<MotionFile
     let mut names = Names::default();
     let mut clips = Vec::new();
     for (path, entry) in &files {
+        let FileUse::Motion(format) = path.file_use() else { continue };
         let row = indices.row(path);
-        let read = if path.has_extension("amc") {
+        let read = format.read_alone(&entry.bytes, &options.bvh).unwrap_or_else(|| {
             let stated = row.and_then(|r| r.frame_rate).or_else(|| amc::stated_frame_rate(&entry.bytes));
-            skeletons.read_amc(path, &entry.bytes, stated.unwrap_or(options.amc_frame_rate))
-        } else if path.has_extension("bvh") {
-            bvh::read(&entry.bytes, &options.bvh)
-        } else {
-            continue;
-        };
+            skeletons.read_amc(entry, stated.unwrap_or(options.amc_frame_rate))
+        });
         let read = match (read, options.broken) {
             (Ok(read), _) => read,
             (Err(e), Broken::Refuse) => return Err(named(e, &entry.name)),
@@ -129,18 +129,5 @@ fn named(error: Error, file: &str) -> Error {
         // the file that is broken is the ASF, which is named already
         Error::InFile { .. } => error,
         other => other.in_file(file),
-    }
-}
-
-/// A skeleton that is read when it is needed first.
-struct LazySkeleton<'e> {
-    entry: &'e Entry,
-    file: OnceCell<Result<Arc<asf::File>>>,
-}
-
-impl LazySkeleton<'_> {
-    fn get(&self) -> Result<Arc<asf::File>> {
-        let read = || asf::read(&self.entry.bytes).map(|r| Arc::new(r.value));
-        self.file.get_or_init(|| read().map_err(|e| e.in_file(&self.entry.name))).clone()
     }
 }

@@ -1,53 +1,48 @@
-use std::{cell::OnceCell, collections::HashMap};
+use std::collections::HashMap;
 
-use model::Motion;
+use super::Path;
 
-use super::{LazySkeleton, Path};
-use crate::{Error, Read, Result, amc, archive::Entry};
-
-/// The skeletons of an archive, by name.
-pub(super) struct Skeletons<'e> {
-    list: Vec<LazySkeleton<'e>>,
-    by_path: HashMap<(&'e str, String), usize>,
+/// Which of some skeletons a motion without its own is on, by the names of the files.
+///
+/// It is the one whose name is the longest beginning of the motion's up to a `_` (`16.asf` for `16_15.amc`), first in the
+/// same folder, then elsewhere; else the only one of the motion's folder, else the only one.
+#[derive(Debug, Clone)]
+pub struct Pairing<'n> {
+    num_skeletons: usize,
+    by_path: HashMap<(&'n str, String), usize>,
     by_stem: HashMap<String, usize>,
     /// of each folder the first skeleton, and whether it is the only one
-    by_folder: HashMap<&'e str, (usize, bool)>,
+    by_folder: HashMap<&'n str, (usize, bool)>,
 }
 
-impl<'e> Skeletons<'e> {
-    /// Of skeletons of one name the first in the order of `files` is taken.
-    pub(super) fn new(files: &[(Path<'e>, &'e Entry)]) -> Self {
-        let mut skeletons = Self {
-            list: Vec::new(),
+impl<'n> Pairing<'n> {
+    /// `skeletons`: their names with their folders, separated by `/`, without the ending of a compression. Of two of one
+    /// name the first is taken.
+    pub fn new(skeletons: impl IntoIterator<Item = &'n str>) -> Self {
+        let mut pairing = Self {
+            num_skeletons: 0,
             by_path: HashMap::new(),
             by_stem: HashMap::new(),
             by_folder: HashMap::new(),
         };
-        for (path, entry) in files.iter().filter(|(path, _)| path.has_extension("asf")) {
-            let index = skeletons.list.len();
-            skeletons.list.push(LazySkeleton { entry, file: OnceCell::new() });
+        for (index, name) in skeletons.into_iter().enumerate() {
+            let path = Path::from_name(name);
             let stem = path.stem.to_lowercase();
-            skeletons.by_path.entry((path.folder, stem.clone())).or_insert(index);
-            skeletons.by_stem.entry(stem).or_insert(index);
-            skeletons
+            pairing.num_skeletons += 1;
+            pairing.by_path.entry((path.folder, stem.clone())).or_insert(index);
+            pairing.by_stem.entry(stem).or_insert(index);
+            pairing
                 .by_folder
                 .entry(path.folder)
                 .and_modify(|(_, is_only)| *is_only = false)
                 .or_insert((index, true));
         }
-        skeletons
+        pairing
     }
 
-    pub(super) fn read_amc(&self, path: &Path<'e>, bytes: &[u8], frame_rate: f64) -> Result<Read<Motion>> {
-        let skeleton = self.skeleton_for(path).ok_or_else(|| {
-            let found = format!("no ASF file for it among {}", self.list.len());
-            Error::whole_file(found, format!("one such as {}.asf", path.subject()))
-        })?;
-        let file = skeleton.get()?;
-        amc::read(bytes, &file, frame_rate)
-    }
-
-    fn skeleton_for(&self, path: &Path<'e>) -> Option<&LazySkeleton<'e>> {
+    /// The index of the skeleton of the motion in a file of that name.
+    pub fn skeleton_of(&self, motion: &str) -> Option<usize> {
+        let path = Path::from_name(motion);
         let stem = path.stem.to_lowercase();
         let starts = || beginnings(&stem);
         let in_folder =
@@ -55,9 +50,8 @@ impl<'e> Skeletons<'e> {
         let elsewhere = || starts().find_map(|start| self.by_stem.get(start).copied());
         let only_in_folder =
             || self.by_folder.get(path.folder).filter(|(_, is_only)| *is_only).map(|(i, _)| *i);
-        let only = || (self.list.len() == 1).then_some(0);
-        let index = in_folder().or_else(elsewhere).or_else(only_in_folder).or_else(only)?;
-        self.list.get(index)
+        let only = || (self.num_skeletons == 1).then_some(0);
+        in_folder().or_else(elsewhere).or_else(only_in_folder).or_else(only)
     }
 }
 

@@ -1,3 +1,6 @@
+use super::FileUse;
+use crate::session::{MotionFormat, SkeletonFormat};
+
 /// A name in an archive, taken apart.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Path<'e> {
@@ -14,13 +17,21 @@ impl<'e> Path<'e> {
         Self { folder, stem, extension }
     }
 
-    pub(super) fn has_extension(&self, extension: &str) -> bool {
-        self.extension.eq_ignore_ascii_case(extension)
+    pub(super) fn file_use(&self) -> FileUse {
+        if self.is_hidden() {
+            return FileUse::None;
+        }
+        // A BVH has a skeleton too, but is there for its motion.
+        let motion = || MotionFormat::from_extension(self.extension).map(FileUse::Motion);
+        let skeleton = || SkeletonFormat::from_extension(self.extension).map(FileUse::Skeleton);
+        let is_index = self.stem.eq_ignore_ascii_case("index") && self.extension.eq_ignore_ascii_case("csv");
+        motion().or_else(skeleton).or(is_index.then_some(FileUse::Index)).unwrap_or(FileUse::None)
     }
 
     /// Files that some systems add to archives, `._16_15.amc` and those in `__MACOSX`.
     pub(super) fn is_hidden(&self) -> bool {
-        let folder_is_hidden = self.folder.split('/').any(|f| f.starts_with('.') || f == "__MACOSX");
+        let is_hidden = |folder: &str| folder.starts_with('.') || folder.eq_ignore_ascii_case("__macosx");
+        let folder_is_hidden = self.folder.split('/').any(is_hidden);
         folder_is_hidden || self.stem.starts_with('.') || self.stem.is_empty()
     }
 
