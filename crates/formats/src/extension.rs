@@ -14,6 +14,15 @@ pub(crate) fn extension(name: &str) -> String {
     if has_stem { extension.to_owned() } else { String::new() }
 }
 
+/// Endings with these extensions, as a sentence has them: `.csv, .trc or .c3d`.
+pub(crate) fn endings(extensions: &[&str]) -> String {
+    let dotted: Vec<String> = extensions.iter().map(|extension| format!(".{extension}")).collect();
+    match dotted.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => dotted.concat(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

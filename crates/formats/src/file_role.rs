@@ -2,7 +2,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::extension::extension;
+use crate::extension::{endings, extension};
 use crate::session::{MotionFormat, PointsFormat, SkeletonFormat};
 
 /// What an uploaded file is for.
@@ -119,11 +119,7 @@ impl FileRole {
             Self::Motion => [&motion_extensions()[..], &ARCHIVES].concat(),
             Self::Scans => [&SCAN[..], &ARCHIVES].concat(),
         };
-        let dotted: Vec<String> = extensions.iter().map(|extension| format!(".{extension}")).collect();
-        match dotted.split_last() {
-            Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
-            _ => dotted.concat(),
-        }
+        endings(&extensions)
     }
 
     /// Whether motion databases are built from files of that name.

@@ -3,8 +3,9 @@
 use model::{Motion, PointTrajectories};
 
 use crate::{
-    BvhOptions, Error, FileRole, PointsOptions, Read, Result, amc, archive, asf, bvh, c3d,
-    extension::extension, points_csv, trc,
+    BvhOptions, Error, PointsOptions, Read, Result, amc, archive, asf, bvh, c3d,
+    extension::{endings, extension},
+    points_csv, trc,
 };
 
 /// Frame rate of an AMC that does not state it when nothing else fits: CMU's, Hz.
@@ -66,7 +67,7 @@ pub fn read_points(name: &str, bytes: &[u8], options: &Options) -> Result<Read<P
     let format = PointsFormat::from_name(name).ok_or_else(|| {
         Error::whole_file(
             "a file of another kind",
-            format!("{} by its name", FileRole::ControlPoints.endings()),
+            format!("{} by its name", endings(&PointsFormat::extensions())),
         )
     })?;
     match archive::unpacked(name, bytes, MAX_POINTS_BYTES)? {
