@@ -1,7 +1,8 @@
-use std::fmt;
+use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
+use crate::archive::without_compression;
 use crate::extension::{endings, extension};
 use crate::session::{MotionFormat, PointsFormat, SkeletonFormat};
 
@@ -78,15 +79,23 @@ impl FileRole {
         if let Some(role) = by_extension.into_iter().find(|role| role.fits_session_file(name)) {
             return Some(role);
         }
-        let extension = extension(name);
+        match extension(name).as_str() {
+            picture if PICTURE.contains(&picture) => Some(Self::Plate),
+            archive if ARCHIVE.contains(&archive) => Some(Self::from_folder(name)),
+            _ => None,
+        }
+    }
+
+    /// The role of the pictures in a folder, or an archive, of that name.
+    pub fn from_folder(name: &str) -> Self {
         let lower = name.to_ascii_lowercase();
         let tells = |words: &[&str]| words.iter().any(|word| lower.contains(word));
-        match extension.as_str() {
-            picture if PICTURE.contains(&picture) => Some(Self::Plate),
-            archive if !ARCHIVE.contains(&archive) => None,
-            _ if tells(&["plate", "background"]) => Some(Self::Plate),
-            _ if tells(&["image", "frame", "photo", "rgb"]) => Some(Self::Images),
-            _ => Some(Self::Masks),
+        if tells(&["plate", "background"]) {
+            Self::Plate
+        } else if tells(&["image", "frame", "photo", "rgb"]) {
+            Self::Images
+        } else {
+            Self::Masks
         }
     }
 
@@ -120,6 +129,11 @@ impl FileRole {
             Self::Scans => [&SCAN[..], &ARCHIVES].concat(),
         };
         endings(&extensions)
+    }
+
+    /// Whether a file of that name is a picture, not compressed once more.
+    pub fn is_picture_file(name: &str) -> bool {
+        without_compression(name) == name && PICTURE.contains(&extension(name).as_str())
     }
 
     /// Whether motion databases are built from files of that name.
@@ -156,11 +170,20 @@ pub struct UnknownFileRole {
     pub found: String,
 }
 
+impl FromStr for FileRole {
+    type Err = UnknownFileRole;
+
+    fn from_str(word: &str) -> Result<Self, UnknownFileRole> {
+        let known = Self::ALL.into_iter().find(|role| role.as_str() == word);
+        known.ok_or_else(|| UnknownFileRole { found: word.to_owned() })
+    }
+}
+
 impl TryFrom<String> for FileRole {
     type Error = UnknownFileRole;
 
-    fn try_from(found: String) -> Result<Self, UnknownFileRole> {
-        Self::ALL.into_iter().find(|role| role.as_str() == found).ok_or(UnknownFileRole { found })
+    fn try_from(word: String) -> Result<Self, UnknownFileRole> {
+        word.parse()
     }
 }
 
@@ -182,6 +205,8 @@ mod tests {
         assert_eq!(FileRole::from_session_file("images.zip"), Some(FileRole::Images));
         assert_eq!(FileRole::from_session_file("silhouettes.tar.gz"), Some(FileRole::Masks));
         assert_eq!(FileRole::from_session_file("scan.obj"), None);
+        assert_eq!(FileRole::from_folder("Backgrounds"), FileRole::Plate);
+        assert!(FileRole::is_picture_file("cam01.JPG") && !FileRole::is_picture_file("cam01.png.gz"));
         assert!(!FileRole::Video.fits_session_file("cam01.zip"));
         assert!(FileRole::is_scan_file("s001.obj") && !FileRole::is_scan_file("s001.bvh"));
         assert_eq!(FileRole::from_session_file(".csv"), None);

@@ -6,6 +6,7 @@ use std::{
 };
 
 use anyhow::{Context, bail};
+use formats::FileRole;
 
 use crate::pack;
 
@@ -15,12 +16,10 @@ pub struct SessionFile {
     /// its name there
     pub name: String,
     /// what it is for, where its name doesn't tell
-    pub role: Option<&'static str>,
+    pub role: Option<FileRole>,
     /// its content
     pub file: File,
 }
-
-const PICTURES: [&str; 3] = [".png", ".jpg", ".jpeg"];
 
 /// Files as they are; of folders: `plates` as plates of the cameras that its files are named after, others packed as frames.
 pub fn gather(paths: &[PathBuf]) -> anyhow::Result<Vec<SessionFile>> {
@@ -32,8 +31,9 @@ pub fn gather(paths: &[PathBuf]) -> anyhow::Result<Vec<SessionFile>> {
         }
         let own = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         // the shell gives the files of plates/*
-        let is_plate = path.parent().is_some_and(|folder| is_named(folder, &["plate"])) && is_picture(&own);
-        let (name, role) = if is_plate { (plate_name(&own), Some("plate")) } else { (own, None) };
+        let is_plate = path.parent().is_some_and(|folder| role_of(folder) == FileRole::Plate)
+            && FileRole::is_picture_file(&own);
+        let (name, role) = if is_plate { (plate_name(&own), Some(FileRole::Plate)) } else { (own, None) };
         found.push(SessionFile { name, role, file: open(path)? });
     }
     Ok(found)
@@ -41,21 +41,21 @@ pub fn gather(paths: &[PathBuf]) -> anyhow::Result<Vec<SessionFile>> {
 
 fn from_folder(folder: &Path) -> anyhow::Result<Vec<SessionFile>> {
     let mut pictures = Vec::new();
-    pack::collect_where(folder, folder, &is_picture, &mut pictures)?;
+    pack::collect_where(folder, folder, &FileRole::is_picture_file, &mut pictures)?;
     if pictures.is_empty() {
         bail!("{} holds no pictures (.png, .jpg); name the files themselves", folder.display());
     }
     pictures.sort_by(|a, b| a.1.cmp(&b.1));
-    if is_named(folder, &["plate", "background"]) {
+    let role = role_of(folder);
+    if role == FileRole::Plate {
         return pictures
             .iter()
             .map(|(path, name)| {
                 let own = name.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                Ok(SessionFile { name: plate_name(&own), role: Some("plate"), file: open(path)? })
+                Ok(SessionFile { name: plate_name(&own), role: Some(role), file: open(path)? })
             })
             .collect();
     }
-    let role = if is_named(folder, &["image", "frame", "photo", "rgb"]) { "images" } else { "masks" };
     let canonical = folder.canonicalize().with_context(|| folder.display().to_string())?;
     let stem = canonical.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let file = pack::write_tar(&pictures)?;
@@ -72,14 +72,8 @@ fn plate_name(name: &str) -> String {
     }
 }
 
-fn is_picture(name: &str) -> bool {
-    let lower = name.to_ascii_lowercase();
-    PICTURES.iter().any(|ending| lower.ends_with(ending))
-}
-
-fn is_named(folder: &Path, words: &[&str]) -> bool {
-    let name = folder.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    words.iter().any(|word| name.contains(word))
+fn role_of(folder: &Path) -> FileRole {
+    FileRole::from_folder(&folder.file_name().map(|n| n.to_string_lossy()).unwrap_or_default())
 }
 
 fn open(path: &Path) -> anyhow::Result<File> {
@@ -101,13 +95,13 @@ mod tests {
         let paths = ["plates", "silhouettes", "images"].map(|name| folder.path().join(name));
         let found: Vec<_> = gather(&paths)?.into_iter().map(|file| (file.name, file.role)).collect();
         let expected = [
-            ("cam1.plate.png".to_owned(), Some("plate")),
-            ("silhouettes.tar".to_owned(), Some("masks")),
-            ("images.tar".to_owned(), Some("images")),
+            ("cam1.plate.png".to_owned(), Some(FileRole::Plate)),
+            ("silhouettes.tar".to_owned(), Some(FileRole::Masks)),
+            ("images.tar".to_owned(), Some(FileRole::Images)),
         ];
         assert_eq!(found, expected);
         let single = gather(&[folder.path().join("plates/cam1.png")])?;
-        assert_eq!((single[0].name.as_str(), single[0].role), ("cam1.plate.png", Some("plate")));
+        assert_eq!((single[0].name.as_str(), single[0].role), ("cam1.plate.png", Some(FileRole::Plate)));
         Ok(())
     }
 }

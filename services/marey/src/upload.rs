@@ -4,6 +4,7 @@ use std::{fs::File, path::PathBuf};
 
 use anyhow::Context;
 use client::{Client, ServerArgs, Session, encode};
+use formats::FileRole;
 use serde_json::Value;
 
 use crate::{session_files, words::counted};
@@ -33,7 +34,7 @@ pub struct Args {
     /// What the files are: skeleton, control-points, ground-truth, calibration, video, images, masks or plate [default: told by
     /// their names]
     #[arg(long)]
-    role: Option<String>,
+    role: Option<FileRole>,
     /// Name to store it under, for a single file [default: its own]
     #[arg(long)]
     name: Option<String>,
@@ -53,7 +54,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     };
     for (index, found) in files.into_iter().enumerate() {
         let name = args.name.clone().unwrap_or(found.name);
-        let sent = put(&client, &session, &name, args.role.as_deref().or(found.role), found.file);
+        let sent = put(&client, &session, &name, args.role.or(found.role), found.file);
         if sent.is_err() && is_new && index == 0 {
             // refused before it held anything: as if it had not been made
             client.delete(&format!("/v1/sessions/{}", session.id))?;
@@ -67,7 +68,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// Uploads one file and says so.
-fn put(client: &Client, session: &Session, name: &str, role: Option<&str>, file: File) -> anyhow::Result<()> {
+fn put(
+    client: &Client,
+    session: &Session,
+    name: &str,
+    role: Option<FileRole>,
+    file: File,
+) -> anyhow::Result<()> {
     let stored = send(client, session, name, role, file)?;
     println!(
         "uploaded {name} as {} ({})",
@@ -82,10 +89,10 @@ pub fn send(
     client: &Client,
     session: &Session,
     name: &str,
-    role: Option<&str>,
+    role: Option<FileRole>,
     file: File,
 ) -> anyhow::Result<Value> {
-    let query = role.map(|role| format!("?role={}", encode(role))).unwrap_or_default();
+    let query = role.map(|role| format!("?role={}", encode(role.as_str()))).unwrap_or_default();
     let path = format!("/v1/sessions/{}/files/{}{query}", session.id, encode(name));
     client.put_file(&path, file).with_context(|| name.to_owned())
 }

@@ -5,7 +5,7 @@ use std::{fs, io::Write, path::Path};
 use anyhow::Context;
 use client::{Client, MotionDatabase, Run, Session};
 use evaluation::{Picture, control_trajectories};
-use formats::BvhOptions;
+use formats::{BvhOptions, FileRole};
 use model::Motion;
 use serde::Deserialize;
 use serde_json::json;
@@ -116,21 +116,21 @@ fn upload_session(
 ) -> anyhow::Result<Session> {
     let session = client.create_session(&format!("{trial} from {} points", points.len()))?;
     let trajectories = control_trajectories(&recording.motion, points)?;
-    let put = |name: &str, role: &str, content: &[u8]| -> anyhow::Result<()> {
+    let put = |name: &str, role: FileRole, content: &[u8]| -> anyhow::Result<()> {
         let mut file = tempfile::tempfile()?;
         file.write_all(content)?;
         std::io::Seek::rewind(&mut file)?;
         upload::send(client, &session, name, Some(role), file).map(|_| ())
     };
-    put("points.csv", "control-points", formats::points_csv::write(&trajectories).as_bytes())?;
+    put("points.csv", FileRole::ControlPoints, formats::points_csv::write(&trajectories).as_bytes())?;
     match &recording.skeleton_text {
         Some(skeleton) => {
-            put("skeleton.asf", "skeleton", skeleton)?;
-            put("truth.amc", "ground-truth", &recording.motion_text)?;
+            put("skeleton.asf", FileRole::Skeleton, skeleton)?;
+            put("truth.amc", FileRole::GroundTruth, &recording.motion_text)?;
         }
         None => {
-            put("skeleton.bvh", "skeleton", &recording.motion_text)?;
-            put("truth.bvh", "ground-truth", &recording.motion_text)?;
+            put("skeleton.bvh", FileRole::Skeleton, &recording.motion_text)?;
+            put("truth.bvh", FileRole::GroundTruth, &recording.motion_text)?;
         }
     }
     Ok(session)
