@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use crate::{FootTracks, POINTS};
+use crate::{Contact, Contacts, FootTracks, POINTS};
 
 /// What counts as standing. The thresholds are cautious: a foot that moves on purpose must not be held.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,50 +35,6 @@ impl Default for DetectSettings {
     }
 }
 
-/// A point of a foot that stands for a while.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Contact {
-    /// which, in the order of [`crate::Feet::points`]
-    pub point: usize,
-    /// frames in which it stands
-    pub frames: Range<usize>,
-}
-
-/// All contacts of a motion.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Contacts {
-    all: Vec<Contact>,
-    num_frames: usize,
-}
-
-impl Contacts {
-    /// The contacts, by point and then by time.
-    pub fn all(&self) -> &[Contact] {
-        &self.all
-    }
-
-    /// Number of frames of the motion.
-    pub fn num_frames(&self) -> usize {
-        self.num_frames
-    }
-
-    /// Whether left and right foot stand in each frame, with ankle or ball; shape `[frames]`.
-    pub fn feet(&self) -> Vec<[bool; 2]> {
-        let mut feet = vec![[false; 2]; self.num_frames];
-        for contact in &self.all {
-            for foot in &mut feet[contact.frames.clone()] {
-                foot[contact.point / 2] = true;
-            }
-        }
-        feet
-    }
-
-    /// Leaves out the contacts that `keep` does not want.
-    pub fn retain(&mut self, keep: impl FnMut(&Contact) -> bool) {
-        self.all.retain(keep);
-    }
-}
-
 /// Finds the contacts of both feet.
 ///
 /// The floor of a point is the height that a tenth of its slow frames are below, ankles and balls each for
@@ -96,7 +52,7 @@ pub fn detect(tracks: &FootTracks, settings: &DetectSettings) -> Contacts {
         }
     }
     all.sort_by_key(|c| (c.point, c.frames.start));
-    Contacts { all, num_frames }
+    Contacts::new(all, num_frames)
 }
 
 /// Speed of a point over two frames to either side (as far as there are any), metres a second; not a number where a

@@ -7,13 +7,15 @@
 //!
 //! `docs/foot-contacts.md` has the method, its thresholds and what was measured.
 
+mod contact;
 mod detect;
 mod error;
 mod feet;
 mod hold;
 mod targets;
 
-pub use detect::{Contact, Contacts, DetectSettings, detect};
+pub use contact::{Contact, Contacts};
+pub use detect::{DetectSettings, detect};
 pub use error::Error;
 pub use feet::{Feet, FootTracks, POINTS};
 pub use hold::{Held, HoldSettings, hold_feet};
