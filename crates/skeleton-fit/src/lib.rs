@@ -10,13 +10,15 @@ mod evidence;
 mod fit;
 mod limbs;
 mod population;
+mod settings;
 mod shapes;
 mod sizes;
 
 pub use error::Error;
-pub use fit::{FitSettings, FittedSkeleton, LimbScale, fit_skeleton};
+pub use fit::{FittedSkeleton, LimbScale, fit_skeleton};
 pub use limbs::{LIMBS, Limb, Limbs};
 pub use population::Population;
+pub use settings::FitSettings;
 pub use sizes::Sizes;
 
 /// Result of the fallible functions of this crate.
