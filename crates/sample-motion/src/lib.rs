@@ -15,6 +15,7 @@
 //! ```
 
 mod action;
+mod action_from_str;
 mod basis;
 mod body;
 mod components;
