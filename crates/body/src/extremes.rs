@@ -13,3 +13,10 @@ pub fn lowest_and_highest(vertices: &[Vector3<f64>]) -> [usize; 2] {
     }
     [lowest, highest]
 }
+
+/// Lowest and highest coordinate y.
+pub fn heights(vertices: &[Vector3<f64>]) -> [f64; 2] {
+    vertices.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], vertex| {
+        [low.min(vertex.y), high.max(vertex.y)]
+    })
+}

@@ -23,6 +23,7 @@
 //! # Ok::<(), body::Error>(())
 //! ```
 
+mod density;
 mod error;
 mod extremes;
 mod file;
@@ -32,6 +33,7 @@ mod jacobian;
 mod learn;
 mod limb;
 mod measure;
+mod mesh_check;
 mod motion;
 mod population;
 mod pose;
@@ -47,7 +49,9 @@ mod skin;
 mod skinned;
 mod subject;
 mod template;
+mod wanted;
 
+pub use density::DENSITY_KG_M3;
 pub use error::Error;
 pub use file::MAX_BYTES;
 pub use glb::{Poses, glb};
@@ -55,8 +59,7 @@ pub use heat::heat_skin;
 pub use jacobian::ShapeDrift;
 pub use learn::{Aligned, Alignment, LearnOptions, Learned, Scan, learn, unpose};
 pub use limb::Limb;
-pub use measure::{DENSITY_KG_M3, Measurements};
-pub use population::Wanted;
+pub use measure::Measurements;
 pub use pose::Posed;
 pub use registered::{RegisteredFit, RegisteredOptions, fit_registered};
 pub use regressor::JointRegressor;
@@ -68,6 +71,7 @@ pub use shipped::{Shipped, shipped};
 pub use skin::Skin;
 pub use subject::{Sex, Subject, UnknownSex};
 pub use template::{KnownJoints, Template, TemplateParts};
+pub use wanted::Wanted;
 
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -1,9 +1,7 @@
 use nalgebra::Vector3;
 
-use crate::{BodyModel, Limb, Shape};
-
-/// Density with which mass follows from volume, kilograms a cubic metre.
-pub const DENSITY_KG_M3: f64 = 985.0;
+use crate::extremes::heights;
+use crate::{BodyModel, DENSITY_KG_M3, Limb, Shape};
 
 /// Sizes of a body in its rest pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,13 +93,6 @@ impl Shape {
         }
         hull_length(section)
     }
-}
-
-/// Lowest and highest coordinate y.
-pub(crate) fn heights(vertices: &[Vector3<f64>]) -> [f64; 2] {
-    vertices.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], vertex| {
-        [low.min(vertex.y), high.max(vertex.y)]
-    })
 }
 
 /// Length of the convex hull of points of a plane (Andrew's monotone chain).

@@ -1,46 +1,29 @@
-//! Bodies by simple measurements. Among the people a model was learned from, coefficients are standard normal and each
-//! measurement is a linear function of them with some rest: `f = f̄ + B α + e`. What is asked for then gives the most probable
-//! α, whichever of the measurements are known, and Newton steps make stature and mass exact.
+//! Measurements of the people a model was learned from: coefficients are standard normal among them, and each measurement is a
+//! linear function of these with some rest: `f = f̄ + B α + e`.
 
 use model::Mesh;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::extremes::lowest_and_highest;
-use crate::measure::{DENSITY_KG_M3, heights};
+use crate::DENSITY_KG_M3;
+use crate::extremes::heights;
 use crate::subject::{Sex, Subject};
-use crate::{BodyModel, Error, Result};
-
-/// Measurements that a body shall have; what is `None` is left to the population.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Wanted {
-    /// metres; met exactly
-    pub stature_m: Option<f64>,
-    /// kilograms; met exactly
-    pub mass_kg: Option<f64>,
-    /// sex
-    pub sex: Option<Sex>,
-    /// age, years
-    pub age_years: Option<f64>,
-}
-
-const STATURE: usize = 0;
-const MASS: usize = 1;
 
 /// One measurement as a function of the coefficients.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Feature {
-    mean: f64,
+pub(crate) struct Feature {
+    pub mean: f64,
     /// for one standard deviation of every component
-    slope: Vec<f64>,
+    pub slope: Vec<f64>,
     /// of what the coefficients don't tell
-    variance: f64,
+    pub variance: f64,
 }
 
 /// How measurements and coefficients go together; a measurement is `None` if too few scans told it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Population {
-    features: [Option<Feature>; 4],
+    /// stature, mass, sex, age
+    pub features: [Option<Feature>; 4],
 }
 
 impl Population {
@@ -99,132 +82,4 @@ impl Feature {
         let variance = known.iter().map(rest).sum::<f64>() / (count - 1.0 - components as f64);
         Some(Self { mean, slope, variance })
     }
-}
-
-impl BodyModel {
-    /// Coefficients of the most probable body with these measurements. Stature and mass are met to a tenth of a
-    /// millimetre and ten grams.
-    ///
-    /// # Errors
-    /// [`Error::Wanted`] if a measurement is beyond what people have, the model doesn't know it, or no body of the model
-    /// within six standard deviations has it.
-    pub fn alpha_for(&self, wanted: &Wanted) -> Result<Vec<f64>> {
-        check_wanted(wanted)?;
-        let sex = wanted.sex.map(|sex| if sex == Sex::Male { 1.0 } else { -1.0 });
-        let asked = [wanted.stature_m, wanted.mass_kg, sex, wanted.age_years];
-        let names = ["stature", "mass", "sex", "age"];
-        let mut features = Vec::new();
-        for (f, value) in asked.iter().enumerate().filter_map(|(f, value)| Some((f, (*value)?))) {
-            let Some(feature) = &self.population.features[f] else {
-                let what = format!("{} was asked for, but the model's scans don't tell it", names[f]);
-                return Err(Error::Wanted { what });
-            };
-            features.push((f, feature, value));
-        }
-        let n = self.num_components();
-        let (mut alpha, covariance) = condition(&features, n);
-        let exact: Vec<_> = features.iter().filter(|(f, ..)| *f == STATURE || *f == MASS).collect();
-        let mut shape = self.shape(&[]);
-        for _ in 0..30 {
-            self.shape_into(alpha.as_slice(), &mut shape);
-            let [low, high] = heights(&shape.vertices);
-            let volume = shape.mesh(self).volume();
-            let miss = DVector::from_iterator(
-                exact.len(),
-                exact.iter().map(|&&(f, _, value)| {
-                    value - if f == STATURE { high - low } else { volume * DENSITY_KG_M3 }
-                }),
-            );
-            let is_met = exact
-                .iter()
-                .zip(&miss)
-                .all(|((f, ..), miss)| miss.abs() < if *f == STATURE { 1e-4 } else { 1e-2 });
-            if is_met {
-                return check_found(alpha.as_slice()).map(|()| alpha.as_slice().to_vec());
-            }
-            let mut slopes = DMatrix::zeros(exact.len(), n);
-            for (row, (f, ..)) in exact.iter().enumerate() {
-                let slope = if *f == STATURE {
-                    self.stature_slope(&shape.vertices)
-                } else {
-                    self.mass_slope(&shape.vertices)
-                };
-                slopes.row_mut(row).copy_from_slice(&slope);
-            }
-            // The likeliest change: as the population varies once what was asked for is known.
-            let spread = &covariance * slopes.transpose();
-            let Some(step) = (&slopes * &spread).lu().solve(&miss) else { break };
-            alpha += spread * step;
-            if alpha.amax() > 20.0 {
-                break;
-            }
-        }
-        Err(Error::Wanted { what: "no body of the model has that stature and mass".into() })
-    }
-
-    fn stature_slope(&self, vertices: &[Vector3<f64>]) -> Vec<f64> {
-        let [low, high] = lowest_and_highest(vertices);
-        let grows = |i| self.displacement(i, high).y - self.displacement(i, low).y;
-        (0..self.num_components()).map(grows).collect()
-    }
-
-    fn mass_slope(&self, vertices: &[Vector3<f64>]) -> Vec<f64> {
-        let mut by_vertex = vec![Vector3::zeros(); vertices.len()];
-        for face in self.faces() {
-            let [a, b, c] = face.map(|corner| vertices[corner as usize]);
-            for (corner, normal) in face.iter().zip([b.cross(&c), c.cross(&a), a.cross(&b)]) {
-                by_vertex[*corner as usize] += normal * (DENSITY_KG_M3 / 6.0);
-            }
-        }
-        let slope = |i| {
-            by_vertex.iter().enumerate().map(|(v, gradient)| gradient.dot(&self.displacement(i, v))).sum()
-        };
-        (0..self.num_components()).map(slope).collect()
-    }
-}
-
-/// Mean and covariance of the coefficients once measurements are known.
-fn condition(features: &[(usize, &Feature, f64)], n: usize) -> (DVector<f64>, DMatrix<f64>) {
-    let count = features.len();
-    let slopes = DMatrix::from_fn(count, n, |row, i| features[row].1.slope[i]);
-    let off = DVector::from_fn(count, |row, _| features[row].2 - features[row].1.mean);
-    let mut spread = &slopes * slopes.transpose();
-    for (row, (_, feature, _)) in features.iter().enumerate() {
-        // A measurement that coefficients tell exactly must not make the matrix singular.
-        spread[(row, row)] += feature.variance + 1e-9 * (1.0 + spread[(row, row)]);
-    }
-    let identity = DMatrix::identity(n, n);
-    match spread.cholesky() {
-        Some(factor) => {
-            let gain = factor.solve(&slopes).transpose();
-            (&gain * off, identity - gain * slopes)
-        }
-        None => (DVector::zeros(n), identity),
-    }
-}
-
-fn check_wanted(wanted: &Wanted) -> Result<()> {
-    let ranges = [
-        ("stature", wanted.stature_m, 1.0, 2.4, "m"),
-        ("mass", wanted.mass_kg, 20.0, 250.0, "kg"),
-        ("age", wanted.age_years, 0.0, 120.0, "years"),
-    ];
-    for (name, value, low, high, unit) in ranges {
-        if let Some(value) = value
-            && !(low..=high).contains(&value)
-        {
-            let what = format!("{name} of {value} {unit} was asked for, expected {low} to {high}");
-            return Err(Error::Wanted { what });
-        }
-    }
-    Ok(())
-}
-
-fn check_found(alpha: &[f64]) -> Result<()> {
-    let most = alpha.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
-    if most <= 6.0 {
-        return Ok(());
-    }
-    let what = format!("such a body is {most:.1} standard deviations from the mean, expected at most 6");
-    Err(Error::Wanted { what })
 }

@@ -1,6 +1,6 @@
 use nalgebra::Vector3;
 
-use crate::learn::check::check_template;
+use crate::mesh_check::check_template;
 use crate::{BodyModel, Error, JointRegressor, Result, Rig, RigFile, Skin, heat_skin};
 
 /// What all scans have in common: topology, skeleton and skin.

@@ -1,7 +1,7 @@
 //! Learning a model from registered scans of people in the base pose: check, align, unpose, principal components.
 
 mod align;
-pub(crate) mod check;
+mod check;
 mod options;
 mod pca;
 mod principal;
