@@ -72,11 +72,11 @@ fn bones(rest: &[Vector3<f64>], rig: &Rig, joints: &[Vector3<f64>]) -> Vec<(usiz
         if bones.len() == before {
             let from = joint.parent.map_or(joints[index], |parent| joints[parent]);
             let direction = (joints[index] - from).try_normalize(1e-9).unwrap_or_default();
-            let of_joint = |vertex: &&Vector3<f64>| {
+            let is_nearest = |vertex: &&Vector3<f64>| {
                 let distance = (*vertex - joints[index]).norm_squared();
                 joints.iter().all(|other| (*vertex - other).norm_squared() >= distance)
             };
-            let reach = rest.iter().filter(of_joint).map(|vertex| (vertex - joints[index]).dot(&direction));
+            let reach = rest.iter().filter(is_nearest).map(|vertex| (vertex - joints[index]).dot(&direction));
             let length = reach.fold(0.0, f64::max) * 0.8;
             bones.push((index, [joints[index], joints[index] + direction * length]));
         }

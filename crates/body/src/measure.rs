@@ -61,8 +61,8 @@ impl Shape {
             let [shoulder, elbow, wrist] =
                 ["shoulder", "elbow", "wrist"].map(|name| model.rig().joint_index(&format!("{side}_{name}")));
             let (shoulder, elbow, wrist) = (shoulder?, elbow?, wrist?);
-            let of_hand = self.vertices.iter().zip(model.skin().joints());
-            let hand = of_hand
+            let vertices = self.vertices.iter().zip(model.skin().joints());
+            let hand = vertices
                 .filter(|(_, joints)| usize::from(joints[0]) == wrist)
                 .map(|(vertex, _)| (vertex - self.joints[wrist]).norm())
                 .fold(0.0, f64::max);

@@ -149,10 +149,10 @@ impl BodyModel {
         }
         let mean: Vec<_> = mean.iter().map(|v| v.map(|x| f64::from(x as f32))).collect();
         let joint_mean = regressor.joints(&mean);
-        let of_component = |c: &Component| -> Vec<_> {
+        let joint_displacements = |c: &Component| -> Vec<_> {
             joints.clone().map(|joint| regressor.joint(joint, |vertex| c.displacement(vertex))).collect()
         };
-        let joint_components = components.iter().map(of_component).collect();
+        let joint_components = components.iter().map(joint_displacements).collect();
         let limbs_of_joints = Limb::for_joints(&rig);
         let limbs = skin.joints().iter().map(|joints| limbs_of_joints[usize::from(joints[0])]).collect();
         Ok(Self {

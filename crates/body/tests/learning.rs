@@ -175,13 +175,16 @@ fn joints_fitted_to_some_people_are_those_of_others() {
         others.clone().map(mean_m).sum::<f64>() / others.len() as f64
     };
     let fitted = error(&Template::new(parts).unwrap());
-    let of_one = error(&Template::new(TemplateParts { known_joints: &[], ..parts }).unwrap());
+    let from_one = error(&Template::new(TemplateParts { known_joints: &[], ..parts }).unwrap());
     let given = error(&data.template);
     println!(
-        "joints fitted to 60 people: {fitted:.4} m, to the template's own: {of_one:.4} m, given: {given:.4} m"
+        "joints fitted to 60 people: {fitted:.4} m, to the template's own: {from_one:.4} m, given: {given:.4} m"
     );
     // The given weights were fitted to all 114 people, these others among them.
-    assert!(fitted < 1.5 * given && fitted < of_one && of_one < 2.0 * given, "{fitted} {of_one} {given}");
+    assert!(
+        fitted < 1.5 * given && fitted < from_one && from_one < 2.0 * given,
+        "{fitted} {from_one} {given}"
+    );
 }
 
 #[test]

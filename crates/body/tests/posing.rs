@@ -137,9 +137,10 @@ fn derivatives_by_the_shape_are_those_of_differences() {
 fn every_limb_has_its_vertices_on_its_side() {
     let model = BodyModel::shipped();
     for limb in Limb::ALL {
-        let of_limb = || model.limbs().iter().zip(model.mean()).filter(|(l, _)| **l == limb).map(|(_, v)| v);
-        assert!(of_limb().count() > 50, "{limb:?} has {} vertices", of_limb().count());
-        let mean_x = of_limb().map(|v| v.x).sum::<f64>() / of_limb().count() as f64;
+        let limb_vertices =
+            || model.limbs().iter().zip(model.mean()).filter(|(l, _)| **l == limb).map(|(_, v)| v);
+        assert!(limb_vertices().count() > 50, "{limb:?} has {} vertices", limb_vertices().count());
+        let mean_x = limb_vertices().map(|v| v.x).sum::<f64>() / limb_vertices().count() as f64;
         let name = format!("{limb:?}");
         let side = if name.starts_with("Left") {
             1.0

@@ -74,11 +74,11 @@ pub fn compare_in_detail(truth: &Motion, found: &Motion) -> Comparison {
     let mut frame_rms_deg = Vec::with_capacity(frames);
     let mut frame_mpjpe_cm = Vec::with_capacity(frames);
     for frame in 0..frames {
-        let mut of_frame = Sums::default();
+        let mut frame_sums = Sums::default();
         let (t, f) = (truth.pose(frame), found.pose(frame));
         for (j, joint) in skeleton.joints().iter().enumerate().skip(1) {
             let angles = Sums::for_joint(joint, flips[j], &t[skeleton.dofs(j)], &f[skeleton.dofs(j)]);
-            of_frame.add(&angles);
+            frame_sums.add(&angles);
             joints[j].add(&angles);
         }
         kinematics.update(t, &mut true_state);
@@ -86,16 +86,16 @@ pub fn compare_in_detail(truth: &Motion, found: &Motion) -> Comparison {
         let shift = true_state.positions[0] - found_state.positions[0];
         for (joint, point) in &landmarks {
             let apart = found_state.point(*joint, point) - true_state.point(*joint, point);
-            of_frame.add(&Sums::of_position(apart, shift));
+            frame_sums.add(&Sums::from_position(apart, shift));
         }
         for (joint, (t, f)) in joints.iter_mut().zip(true_state.positions.iter().zip(&found_state.positions))
         {
-            joint.add(&Sums::of_position(f - t, shift));
+            joint.add(&Sums::from_position(f - t, shift));
         }
-        let errors = of_frame.errors(1);
+        let errors = frame_sums.errors(1);
         frame_rms_deg.push(errors.rms_deg);
         frame_mpjpe_cm.push(errors.mpjpe_cm);
-        all.add(&of_frame);
+        all.add(&frame_sums);
     }
     let joints = skeleton.joints().iter().zip(&joints).map(|(joint, sums)| {
         let errors = sums.errors(frames);
@@ -154,7 +154,7 @@ impl Sums {
     }
 
     /// Of one point: `apart` from the truth, and by `shift` more when the roots are brought together.
-    fn of_position(apart: Vector3<f64>, shift: Vector3<f64>) -> Self {
+    fn from_position(apart: Vector3<f64>, shift: Vector3<f64>) -> Self {
         let (position, aligned_position) = (apart.norm(), (apart + shift).norm());
         Self { position, aligned_position, positions: 1.0, ..Self::default() }
     }

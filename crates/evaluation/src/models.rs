@@ -16,7 +16,7 @@ const FOLDS: usize = 5;
 pub(crate) struct Models {
     folds: Vec<Gplvm>,
     /// the fold of each trial
-    of_trial: Vec<usize>,
+    trial_folds: Vec<usize>,
 }
 
 impl Models {
@@ -28,17 +28,17 @@ impl Models {
         pool: &rayon::ThreadPool,
     ) -> Result<Self, Error> {
         if !evaluation.sweep.methods.contains(&Method::Gplvm) {
-            return Ok(Self { folds: Vec::new(), of_trial: Vec::new() });
+            return Ok(Self { folds: Vec::new(), trial_folds: Vec::new() });
         }
-        let of_trial = folds(evaluation);
-        let used: BTreeSet<usize> = of_trial.iter().copied().collect();
+        let trial_folds = folds(evaluation);
+        let used: BTreeSet<usize> = trial_folds.iter().copied().collect();
         let trained: Vec<_> = pool.install(|| {
             let folds: Vec<usize> = (0..=used.last().copied().unwrap_or(0)).collect();
             folds
                 .par_iter()
                 .map(|fold| {
                     let is_left_out = |other: &ClipInfo| {
-                        evaluation.test.iter().zip(&of_trial).any(|(clip, f)| {
+                        evaluation.test.iter().zip(&trial_folds).any(|(clip, f)| {
                             f == fold && evaluation.protocol.leaves_out(&clip.name, &clip.subject, other)
                         })
                     };
@@ -49,12 +49,12 @@ impl Models {
                 .collect()
         });
         let folds = trained.into_iter().collect::<Result<Vec<_>, _>>();
-        Ok(Self { folds: folds.map_err(|source| Error::Training { source })?, of_trial })
+        Ok(Self { folds: folds.map_err(|source| Error::Training { source })?, trial_folds })
     }
 
     /// The model for a trial.
     pub fn for_trial(&self, trial: usize) -> Option<&Gplvm> {
-        self.folds.get(*self.of_trial.get(trial)?)
+        self.folds.get(*self.trial_folds.get(trial)?)
     }
 }
 

@@ -69,8 +69,8 @@ pub fn evaluate_sparse(
         let database = MotionDatabase::build(clips)?;
         let models = Models::train(evaluation, &database, &pool)?;
         let cases = sweep.cases(poses);
-        let mut of_size: Vec<Option<TrialResult>> = Vec::new();
-        of_size.resize_with(cases.len() * evaluation.test.len(), || None);
+        let mut size_results: Vec<Option<TrialResult>> = Vec::new();
+        size_results.resize_with(cases.len() * evaluation.test.len(), || None);
         let mut windows: Vec<usize> = cases.iter().map(|(case, _)| case.window).collect();
         windows.sort_unstable();
         windows.dedup();
@@ -79,10 +79,10 @@ pub fn evaluate_sparse(
             let after_each = || progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
             for (task, result) in pool.install(|| bench.run_all(&cases, &after_each)) {
                 let in_trial = |source| Error::Trial { trial: task.clip.name.clone(), source };
-                of_size[task.place] = result.map_err(in_trial)?;
+                size_results[task.place] = result.map_err(in_trial)?;
             }
         }
-        results.extend(of_size.into_iter().flatten());
+        results.extend(size_results.into_iter().flatten());
     }
     compare_gaps(&mut results);
     Ok(results)
@@ -158,8 +158,8 @@ impl<'a> Bench<'a> {
     fn tasks(&self, cases: &'a [(Case, usize)]) -> Vec<Vec<Task<'a>>> {
         let SparseEvaluation { test, sweep, protocol, .. } = self.evaluation;
         let mut groups: Vec<Vec<Task<'a>>> = Vec::new();
-        let of_window = |(_, (case, _)): &(usize, &'a (Case, usize))| case.window == self.window;
-        for (c, (case, variant)) in cases.iter().enumerate().filter(of_window) {
+        let has_window = |(_, (case, _)): &(usize, &'a (Case, usize))| case.window == self.window;
+        for (c, (case, variant)) in cases.iter().enumerate().filter(has_window) {
             let parameters = &sweep.variants[*variant].parameters;
             for (trial, clip) in test.iter().enumerate() {
                 let task = Task { place: c * test.len() + trial, case, parameters, trial, clip };

@@ -73,14 +73,14 @@ pub fn summarise(results: &[TrialResult], protocol: Protocol) -> Vec<Row> {
     }
     let mut rows = Vec::new();
     for case in cases {
-        let of_case: Vec<_> = results.iter().filter(|r| r.case == *case).collect();
+        let in_case: Vec<_> = results.iter().filter(|r| r.case == *case).collect();
         let mut actions: Vec<&str> =
-            of_case.iter().map(|r| r.action.as_str()).filter(|a| !a.is_empty() && *a != ALL).collect();
+            in_case.iter().map(|r| r.action.as_str()).filter(|a| !a.is_empty() && *a != ALL).collect();
         actions.sort_unstable();
         actions.dedup();
         for action in actions.into_iter().chain([ALL]) {
             let trials: Vec<_> =
-                of_case.iter().copied().filter(|r| action == ALL || r.action == action).collect();
+                in_case.iter().copied().filter(|r| action == ALL || r.action == action).collect();
             rows.push(row(&trials, case, protocol, action));
         }
     }

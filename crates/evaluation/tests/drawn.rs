@@ -46,11 +46,11 @@ fn every_trial_is_evaluated_under_every_method_and_number_of_points() {
     assert_eq!(results.len(), 2 * 2 * 3);
     for points in [4, 6] {
         for method in both {
-            let of_case: Vec<_> =
+            let in_case: Vec<_> =
                 results.iter().filter(|r| r.case.points == points && r.case.method == method).collect();
-            let names: Vec<_> = of_case.iter().map(|r| r.trial.as_str()).collect();
+            let names: Vec<_> = in_case.iter().map(|r| r.trial.as_str()).collect();
             assert_eq!(names, ["0_0", "0_1", "0_2"]);
-            for r in of_case {
+            for r in in_case {
                 let errors = r.comparison.errors;
                 assert_eq!(errors.frames, 60);
                 // Nothing of the trial itself was used: no error would be a sign that it was.

@@ -24,10 +24,10 @@ struct Means {
 
 /// Means over the trials of one method and number of points, and their table.
 fn means(results: &[TrialResult], method: Method, points: usize) -> Means {
-    let of_case: Vec<_> =
+    let in_case: Vec<_> =
         results.iter().filter(|r| r.case.method == method && r.case.points == points).collect();
     let mean = |value: &dyn Fn(&TrialResult) -> f64| {
-        of_case.iter().map(|r| value(r)).sum::<f64>() / of_case.len() as f64
+        in_case.iter().map(|r| value(r)).sum::<f64>() / in_case.len() as f64
     };
     let found = Means {
         rms_deg: mean(&|r| r.comparison.errors.rms_deg),

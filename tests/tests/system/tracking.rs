@@ -54,12 +54,12 @@ pub(crate) fn take(empty: usize) -> Result<Take> {
         (pose[legs[0]], pose[legs[1]]) = (0.4 * share, -0.2 * share);
         shape.pose(&model, &pose, &mut posed);
         let mesh = Mesh::new(posed.vertices.clone(), model.faces().to_vec())?;
-        let of_frame = silhouettes(&mesh, &cameras);
-        for (camera, mask) in cameras.iter().zip(&of_frame) {
+        let frame_masks = silhouettes(&mesh, &cameras);
+        for (camera, mask) in cameras.iter().zip(&frame_masks) {
             let name = format!("{}/{:04}.png", camera.name, empty + frame);
             files.push((name, image_files::write_silhouette(mask)));
         }
-        seen.push(of_frame);
+        seen.push(frame_masks);
         truth.push(posed.joints.clone());
     }
     let files: Vec<(&str, &[u8])> =

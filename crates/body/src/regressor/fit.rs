@@ -20,7 +20,7 @@ pub fn fit(meshes: &[&[Vector3<f64>]], joints: &[&[Vector3<f64>]]) -> Result<Joi
     };
     if meshes.len() != joints.len()
         || meshes.iter().any(|mesh| mesh.len() != first.len())
-        || joints.iter().any(|of_mesh| of_mesh.len() != first_joints.len())
+        || joints.iter().any(|own| own.len() != first_joints.len())
     {
         let what = "meshes and joints to fit to have different counts".into();
         return Err(Error::Regressor { what });

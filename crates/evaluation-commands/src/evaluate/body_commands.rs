@@ -73,9 +73,9 @@ pub fn skeletons(args: &Args) -> anyhow::Result<()> {
         for source in
             [SkeletonSource::Own, SkeletonSource::First, SkeletonSource::Mean, SkeletonSource::Fitted]
         {
-            let of_case: Vec<_> =
+            let in_case: Vec<_> =
                 results.iter().filter(|r| r.points == points && r.source == source).collect();
-            print_skeleton_row(points, source, &of_case);
+            print_skeleton_row(points, source, &in_case);
         }
     }
     println!("{} trials, each from recordings of other performers", test.len());

@@ -120,13 +120,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let shape = model.shape(&[]);
     let is_drawn = args.data.is_none() && args.boxing.is_empty() && args.walking.is_empty();
     let found = args.data.iter().cloned().collect::<Vec<_>>();
-    let of_folder = motions::read(&found)?;
+    let clips = motions::read(&found)?;
     let (mut rows, mut speed, mut trials) = (Vec::new(), Vec::new(), Vec::new());
     for test in TESTS {
         let chosen = if is_drawn {
             sample(test.limbs, args.frames)?
         } else if args.data.is_some() {
-            recorded(&of_folder, test.action)?
+            recorded(&clips, test.action)?
         } else {
             let files = if test.limbs == Limbs::Arms { &args.boxing } else { &args.walking };
             motions::read_files(files)?.into_iter().map(|clip| (clip.name, clip.motion)).collect()
@@ -173,8 +173,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 /// The trials of an action that nothing was tuned on.
 fn recorded(clips: &[Clip], action: &str) -> anyhow::Result<Vec<(String, Motion)>> {
-    let of_action = clips.iter().filter(|c| c.action == action && !TUNED_ON.contains(&c.name.as_str()));
-    let chosen: Vec<_> = of_action.map(|c| (c.name.clone(), c.motion.clone())).collect();
+    let usable = clips.iter().filter(|c| c.action == action && !TUNED_ON.contains(&c.name.as_str()));
+    let chosen: Vec<_> = usable.map(|c| (c.name.clone(), c.motion.clone())).collect();
     if chosen.is_empty() {
         bail!(
             "found no trial of action {action} (column action of index.csv) beside {}",

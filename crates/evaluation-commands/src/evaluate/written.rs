@@ -98,9 +98,9 @@ impl Outcome<'_> {
     fn is_compared(&self) -> bool {
         let first = &self.rows[0].case;
         self.rows.iter().map(|row| &row.case).any(|case| {
-            let of_papers = papers::METHODS[..3].contains(&case.method.to_string().as_str());
+            let is_published = papers::METHODS[..3].contains(&case.method.to_string().as_str());
             let plain = Case { method: first.method, points: first.points, ..case.clone() };
-            of_papers || plain != *first
+            is_published || plain != *first
         })
     }
 

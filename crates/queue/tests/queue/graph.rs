@@ -96,8 +96,8 @@ async fn dependencies_that_cannot_be_are_refused() {
     let on_itself = [job(Chunk, json!(0)).depends_on([0])];
     let refused = queue::enqueue_many(&mut connection, run_id, &on_itself).await;
     assert!(matches!(refused, Err(queue::Error::DependencyNotEarlier { index: 0, depends_on: 0 })));
-    let of_another_run = NewJob { depends_on: &elsewhere, ..NewJob::new(run_id, &Chunk(json!(0))).unwrap() };
-    let refused = queue::enqueue(&mut connection, &of_another_run).await;
+    let across_runs = NewJob { depends_on: &elsewhere, ..NewJob::new(run_id, &Chunk(json!(0))).unwrap() };
+    let refused = queue::enqueue(&mut connection, &across_runs).await;
     assert!(matches!(refused, Err(queue::Error::NoSuchDependency { found: 0, expected: 1, .. })));
     let nowhere = NewJob::new(queue::RunId(uuid::Uuid::nil()), &Chunk(json!(0))).unwrap();
     assert!(matches!(queue::enqueue(&mut connection, &nowhere).await, Err(queue::Error::NoSuchRun(_))));

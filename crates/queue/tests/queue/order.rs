@@ -28,8 +28,8 @@ async fn a_small_project_does_not_wait_behind_a_big_one() {
     queue.run_of(big, &jobs(Chunk, 500)).await;
     queue.run_of(small, &jobs(Chunk, 4)).await;
     let batch = queue.claim("chunk", 8).await;
-    let of_small = batch.iter().filter(|job| job.project_id == small).count();
-    assert_eq!(of_small, 4, "half of the slots, though it came last");
+    let from_small = batch.iter().filter(|job| job.project_id == small).count();
+    assert_eq!(from_small, 4, "half of the slots, though it came last");
     // The big one has 4 running; a third project gets as many before the big one gets a fifth.
     let third = ProjectId(Uuid::new_v4());
     queue.run_of(third, &jobs(Chunk, 50)).await;

@@ -29,7 +29,7 @@ impl Job for Frames {
 }
 
 /// The one job of a run, as a program enqueued it whose payloads had that version.
-fn of_version(payload_version: i32, payload: Value) -> ChildJob {
+fn versioned(payload_version: i32, payload: Value) -> ChildJob {
     ChildJob { payload_version, ..job(Chunk, payload) }
 }
 
@@ -38,7 +38,7 @@ async fn an_unreadable_payload_fails_at_once_with_a_message() {
     let queue = Queue::new().await;
     let handler = reads(async |_, _: Frames| Ok(Outcome::default()));
     let _worker = queue.worker().handler(handler).start(CancellationToken::new());
-    let (run_id, ids) = queue.run(&[of_version(3, json!({ "first_frame": "one" }))]).await;
+    let (run_id, ids) = queue.run(&[versioned(3, json!({ "first_frame": "one" }))]).await;
     let status = queue.wait_for_run(run_id, RunState::Failed).await;
     assert_eq!(queue.job(ids[0], "attempts").await, "1");
     assert_eq!(status.error_message.as_deref(), Some("the payload of this chunk job cannot be read"));
@@ -54,7 +54,7 @@ async fn payloads_of_this_version_and_of_an_older_one_that_is_understood_are_rea
     });
     let _worker = queue.worker().handler(handler).start(CancellationToken::new());
     let own = ChildJob::new(&Frames { first_frame: 120 }).unwrap();
-    let older = of_version(2, json!({ "first_second": 2 }));
+    let older = versioned(2, json!({ "first_second": 2 }));
     let (run_id, ids) = queue.run(&[own, older]).await;
     queue.wait_for_run(run_id, RunState::Succeeded).await;
     assert_eq!(queue.job(ids[0], "payload_version").await, "3");
@@ -68,7 +68,7 @@ async fn a_payload_of_a_version_that_is_not_understood_is_refused_and_not_misrea
     let _worker = queue.worker().handler(handler).start(CancellationToken::new());
     // Each could be read as one of version 3.
     for version in [1, 4] {
-        let (run_id, ids) = queue.run(&[of_version(version, json!({ "first_frame": 1 }))]).await;
+        let (run_id, ids) = queue.run(&[versioned(version, json!({ "first_frame": 1 }))]).await;
         let status = queue.wait_for_run(run_id, RunState::Failed).await;
         let message = status.error_message.unwrap();
         let said = format!("its payload has version {version}, this one reads 3");

@@ -45,7 +45,7 @@ pub fn measure(index: &WindowIndex, runs: &[Run], k: usize, search: Search, trut
     let (mut times, mut hits, mut worst, mut tracked) = (Vec::new(), 0, 1.0f64, 0);
     for (r, run) in runs.iter().enumerate() {
         hints.clear();
-        let mut of_run = Vec::new();
+        let mut run_rows = Vec::new();
         let (mut run_hits, mut run_queries) = (0, 0);
         for (q, features) in run.queries().enumerate() {
             let query = Query { features, controls: None, exclude: &[], hints: &hints };
@@ -63,13 +63,13 @@ pub fn measure(index: &WindowIndex, runs: &[Run], k: usize, search: Search, trut
             if is_first {
                 let mut rows: Vec<usize> = found.iter().map(|n| n.row).collect();
                 rows.sort_unstable();
-                of_run.push(rows);
+                run_rows.push(rows);
             }
             if !tracks || q > 0 {
                 times.push(seconds);
                 tracked += usize::from(way == SearchMode::Tracked);
                 run_queries += 1;
-                let expected = if is_first { &of_run[q] } else { &truth[r][q] };
+                let expected = if is_first { &run_rows[q] } else { &truth[r][q] };
                 run_hits += found.iter().filter(|n| expected.binary_search(&n.row).is_ok()).count();
             }
             hints.clear();
@@ -79,7 +79,7 @@ pub fn measure(index: &WindowIndex, runs: &[Run], k: usize, search: Search, trut
             }
         }
         if is_first {
-            truth.push(of_run);
+            truth.push(run_rows);
         }
         if run_queries > 0 {
             worst = worst.min(run_hits as f64 / (run_queries * k) as f64);

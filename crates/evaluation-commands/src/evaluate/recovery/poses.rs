@@ -54,13 +54,13 @@ pub fn read(
     if performers.len() < PARTS {
         bail!("found recordings of {} performers, expected at least {PARTS}", performers.len());
     }
-    let of_part = |part: usize| -> (Vec<&str>, Vec<&Clip>) {
+    let in_part = |part: usize| -> (Vec<&str>, Vec<&Clip>) {
         let those: Vec<&str> = performers.iter().skip(part).step_by(PARTS).copied().collect();
         let clips = clips.iter().filter(|clip| those.contains(&clip.subject.as_str())).collect();
         (those, clips)
     };
-    let (drawn_of, drawn) = of_part(if part == Part::Report { 0 } else { 1 });
-    let (prior_of, prior) = of_part(2);
+    let (drawn_of, drawn) = in_part(if part == Part::Report { 0 } else { 1 });
+    let (prior_of, prior) = in_part(2);
     eprintln!("bringing {} recordings to the body", drawn.len() + prior.len());
     let [drawn, prior] = [drawn, prior].map(|clips| poses(model, &clips));
     Ok(Poses {
