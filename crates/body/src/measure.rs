@@ -1,5 +1,3 @@
-use nalgebra::Vector3;
-
 use crate::extremes::heights;
 use crate::{BodyModel, DENSITY_KG_M3, Limb, Shape};
 
