@@ -1,5 +1,5 @@
-//! Measurements of the people a model was learned from: coefficients are standard normal among them, and each measurement is a
-//! linear function of these with some rest: `f = f̄ + B α + e`.
+//! Measurements of the people a model was learned from: coefficients are standard normal among them, and each
+//! measurement is a linear function of these with some rest: `f = f̄ + B α + e`.
 
 use model::Mesh;
 use nalgebra::Vector3;

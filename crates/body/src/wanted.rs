@@ -1,5 +1,5 @@
-//! Bodies by simple measurements. What is asked for gives the most probable coefficients, whichever of the measurements are
-//! known, by what [`crate::population`] tells of them, and Newton steps make stature and mass exact.
+//! Bodies by simple measurements. What is asked for gives the most probable coefficients α, whichever of the
+//! measurements are known, by what [`crate::population`] tells of them; Newton steps make stature and mass exact.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 

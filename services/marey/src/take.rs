@@ -115,3 +115,35 @@ fn unpacked(path: &Path) -> anyhow::Result<Entry> {
     // a file that is no archive is one entry
     entries.pop().with_context(|| format!("{}: nothing in it", path.display()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn takes_are_paired_as_in_a_motion_database_of_the_folder() -> anyhow::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let files = [
+            "bodies/16.asf.gz",
+            "bodies/ann.asf",
+            "bodies/ann_2.asf",
+            "takes/16_15.amc",
+            "takes/ann_2_1.amc",
+        ];
+        for name in files.iter().chain(&["takes/walk.bvh", "takes/._16_15.amc", "takes/other.amc"]) {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().context("a folder")?)?;
+            fs::write(path, "x")?;
+        }
+        let takes = Take::find_all(folder.path())?;
+        let found: Vec<_> = takes
+            .iter()
+            .map(|take| {
+                (take.name.as_str(), take.skeleton.as_deref().map(|path| path.ends_with("16.asf.gz")))
+            })
+            .collect();
+        assert_eq!(found, [("16_15", Some(true)), ("ann_2_1", Some(false)), ("walk", None)]);
+        assert_eq!(takes[1].skeleton, Some(folder.path().join("bodies/ann_2.asf")));
+        Ok(())
+    }
+}

@@ -70,7 +70,8 @@ pub fn is_motion_file(name: &str) -> bool {
 
 /// The motions of all AMC and BVH files, in the order of their paths.
 ///
-/// AMC files are on the skeletons that [`Pairing`] finds for them. Files named `index.csv` may give the columns `file` or `trial`, and `action`, `subject` and `fps` (of AMC).
+/// AMC files are on the skeletons that [`Pairing`] finds for them. Files named `index.csv` may give the columns `file`
+/// or `trial`, and `action`, `subject` and `fps` (of AMC).
 /// Hidden files and all others are left alone.
 ///
 /// # Errors

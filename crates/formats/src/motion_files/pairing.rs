@@ -4,8 +4,8 @@ use super::Path;
 
 /// Which of some skeletons a motion without its own is on, by the names of the files.
 ///
-/// It is the one whose name is the longest beginning of the motion's up to a `_` (`16.asf` for `16_15.amc`), first in the
-/// same folder, then elsewhere; else the only one of the motion's folder, else the only one.
+/// It is the one whose name is the longest beginning of the motion's up to a `_` (`16.asf` for `16_15.amc`), first in
+/// the same folder, then elsewhere; else the only one of the motion's folder, else the only one.
 #[derive(Debug, Clone)]
 pub struct Pairing<'n> {
     num_skeletons: usize,
@@ -16,8 +16,8 @@ pub struct Pairing<'n> {
 }
 
 impl<'n> Pairing<'n> {
-    /// `skeletons`: their names with their folders, separated by `/`, without the ending of a compression. Of two of one
-    /// name the first is taken.
+    /// `skeletons`: their names with their folders, separated by `/`, without the ending of a compression. Of two of
+    /// one name the first is taken.
     pub fn new(skeletons: impl IntoIterator<Item = &'n str>) -> Self {
         let mut pairing = Self {
             num_skeletons: 0,
