@@ -4,10 +4,10 @@ pub use body::Sex;
 pub use inverse_kinematics::Method;
 use queue::Job;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::{
-    JobReport, PointChoice, SessionInputs,
+    CameraChoice, JobReport, PointChoice, SessionInputs,
     body_model::BodyModelFile,
     run_json::{LearnedFrom, Request, Subject},
 };
@@ -82,6 +82,15 @@ impl Request for SolveInverseKinematics {
         LearnedFrom { body_model: Some(&self.body_model), ..LearnedFrom::default() }
     }
 
+    fn reading(&self) -> Value {
+        let cameras = self.cameras.as_ref();
+        json!({
+            "up": self.inputs.up,
+            "cameras": cameras.map(|planned| &planned.choice),
+            "silhouettes": cameras.and_then(|planned| planned.parameters.as_ref()),
+        })
+    }
+
     fn parameters(&self) -> serde_json::Result<Value> {
         serde_json::to_value(&self.how)
     }
@@ -92,6 +101,12 @@ impl Request for SolveInverseKinematics {
 pub struct CamerasPlanned {
     /// First frame that there are silhouettes of.
     pub first_frame: usize,
+    /// Which cameras.
+    #[serde(default)]
+    pub choice: CameraChoice,
+    /// How their silhouettes were made.
+    #[serde(default)]
+    pub parameters: Option<multi_view::Parameters>,
     /// What was sloppy about the files.
     pub warnings: Vec<String>,
     /// What the plan itself took.

@@ -3,12 +3,10 @@
 mod silhouettes;
 mod tracking;
 
-use std::collections::BTreeMap;
-
 use multi_view::Parameters;
 use queue::Job;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 pub use silhouettes::{
     CameraClips, CameraReport, CameraSummary, ClipPlace, MakeSilhouettes, Members, Source, SourceKind,
@@ -17,7 +15,7 @@ pub use silhouettes::{
 pub use tracking::{DrawOverlay, FitShape, MergeTracks, TRACKED, TrackChunk, TrackingSession};
 
 use crate::{
-    SessionInputs,
+    CameraChoice, SessionInputs,
     body_model::BodyModelFile,
     inverse_kinematics::InverseKinematics,
     run_json::{LearnedFrom, Request, Subject},
@@ -35,15 +33,9 @@ pub struct PlanMultiView {
     pub inputs: SessionInputs,
     /// The bodies that people may have.
     pub body_model: BodyModelFile,
-    /// Cameras to use, by name; empty: all that the session has pictures of.
-    #[serde(default)]
-    pub cameras: Vec<String>,
-    /// File, or `ARCHIVE/FOLDER`, → name of its camera, where names don't tell.
-    #[serde(default)]
-    pub camera_files: BTreeMap<String, String>,
-    /// Metres of one unit of the calibration, where the file doesn't say it.
-    #[serde(default)]
-    pub metres_per_unit: Option<f64>,
+    /// Which cameras.
+    #[serde(flatten)]
+    pub choice: CameraChoice,
     /// All resolved.
     pub parameters: Parameters,
     /// The silhouettes are for inverse kinematics: no body is looked for in them.
@@ -70,6 +62,10 @@ impl Request for PlanMultiView {
 
     fn parameters(&self) -> serde_json::Result<Value> {
         serde_json::to_value(&self.parameters)
+    }
+
+    fn reading(&self) -> Value {
+        json!({ "up": self.inputs.up, "cameras": self.choice })
     }
 
     fn seeds(&self) -> Vec<u64> {

@@ -38,6 +38,12 @@ pub trait Request {
     /// If they are no JSON.
     fn parameters(&self) -> serde_json::Result<Value>;
 
+    /// How the files were read, as far as a request may say: what is not among the parameters of the method; null where nothing
+    /// may be said.
+    fn reading(&self) -> Value {
+        Value::Null
+    }
+
     /// What random numbers came from; empty where nothing is drawn at random.
     fn seeds(&self) -> Vec<u64> {
         Vec::new()
@@ -68,6 +74,9 @@ pub struct SessionReport<'a> {
     /// name in the file → name of a control point or joint
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mapping: Option<&'a BTreeMap<String, String>>,
+    /// how its files were read
+    #[serde(skip_serializing_if = "Value::is_null")]
+    pub reading: Value,
     /// frames that were solved
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<usize>,
@@ -199,6 +208,7 @@ impl RunReport<'_> {
         if let Subject::Session(session) = &mut subject {
             (session.frames, session.frame_rate_hz) = self.frames.unzip();
             session.points = self.points.clone();
+            session.reading = request.reading();
         }
         let document = Document {
             run_id: self.origin.run_id,

@@ -37,6 +37,20 @@ impl SessionInputs {
     }
 }
 
+/// Which cameras are used, and how the calibration is read.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct CameraChoice {
+    /// Cameras to use, by name; empty: all that the session has pictures of.
+    #[serde(default)]
+    pub cameras: Vec<String>,
+    /// File, or `ARCHIVE/FOLDER`, → name of its camera, where names don't tell.
+    #[serde(default)]
+    pub camera_files: BTreeMap<String, String>,
+    /// Metres of one unit of the calibration, where the file doesn't say it.
+    #[serde(default)]
+    pub metres_per_unit: Option<f64>,
+}
+
 /// Which measured points of a file are used, and which of its markers make them. At most one of `mapping`, `marker_map` and
 /// a `marker_set` other than `auto` is given.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]

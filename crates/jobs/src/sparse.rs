@@ -3,7 +3,7 @@
 use formats::{BvhOptions, PointsOptions, session};
 use queue::Job;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 use skeleton_fit::{LimbScale, Sizes};
 use sparse::Parameters;
 
@@ -63,6 +63,10 @@ impl Request for PlanSparse {
 
     fn learned_from(&self) -> LearnedFrom<'_> {
         LearnedFrom { motion_database: Some(&self.motion_database), ..LearnedFrom::default() }
+    }
+
+    fn reading(&self) -> Value {
+        json!({ "up": self.inputs.up, "bvh_metres_per_unit": self.bvh_metres_per_unit, "points": self.choice })
     }
 
     fn parameters(&self) -> serde_json::Result<Value> {

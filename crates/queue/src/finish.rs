@@ -107,7 +107,13 @@ pub async fn fail(connection: &mut PgConnection, lease: &Lease, failure: &Failur
     if lock_existing_run(&mut transaction, lease.run_id).await?.is_none() {
         return Ok(Settled::LeaseLost);
     }
-    let settled = fail_locked(&mut transaction, lease, failure, "this step failed too often").await?;
+    let used_up = match failure {
+        Failure::Retry { detail, .. } => {
+            format!("this step failed too often, the last time because: {}", shown(detail))
+        }
+        Failure::GiveUp { .. } => String::new(),
+    };
+    let settled = fail_locked(&mut transaction, lease, failure, &used_up).await?;
     match settled {
         Some(settled) => {
             transaction.commit().await?;
@@ -115,6 +121,14 @@ pub async fn fail(connection: &mut PgConnection, lease: &Lease, failure: &Failur
         }
         None => refused(transaction, lease).await,
     }
+}
+
+/// Most characters of a cause that people are shown.
+const SHOWN: usize = 300;
+
+/// The first line of what a developer is told.
+fn shown(detail: &str) -> String {
+    without_nul(detail).lines().next().unwrap_or_default().chars().take(SHOWN).collect()
 }
 
 /// Gives the job to someone else without counting the attempt.

@@ -6,6 +6,7 @@ pub(crate) mod job;
 mod evidence;
 mod export;
 mod finished;
+mod outliers;
 mod report;
 
 /// Most points of a figure that may be measured.

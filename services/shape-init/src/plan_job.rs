@@ -43,8 +43,13 @@ impl Handler for PlanHandler {
         let bytes = self.shared.resources.read_file(file, MAX_CALIBRATION_BYTES).await?;
         let (mut warnings, cameras) = read_calibration(&request, file, &bytes, picture_size)?;
         let names: Vec<String> = cameras.iter().map(|camera| camera.name.clone()).collect();
-        let matched =
-            sources::match_cameras(sources, &names, &request.cameras, &request.camera_files, &mut warnings)?;
+        let matched = sources::match_cameras(
+            sources,
+            &names,
+            &request.choice.cameras,
+            &request.choice.camera_files,
+            &mut warnings,
+        )?;
         // measured points say where the person is; without them it takes two views
         sources::check_count(&matched, if request.inverse_kinematics.is_some() { 1 } else { 2 })?;
         let plan = self.shared.resources.job_report(&context, 0);
@@ -123,7 +128,7 @@ fn read_calibration(
     image_size: Option<[u32; 2]>,
 ) -> Result<(Vec<String>, Vec<Camera>), InputError> {
     let up = request.inputs.up.map(Into::into);
-    let options = calibration::Options { up, metres_per_unit: request.metres_per_unit, image_size };
+    let options = calibration::Options { up, metres_per_unit: request.choice.metres_per_unit, image_size };
     let read = calibration::read(&file.name, bytes, &options).map_err(FileError::in_file(&file.name))?;
     let warnings = read.warnings.into_iter().map(|w| format!("{}: {}", file.name, w.message)).collect();
     Ok((warnings, read.value))
@@ -158,7 +163,13 @@ fn children(
             inputs: request.inputs,
             body_model: request.body_model,
             how,
-            cameras: Some(CamerasPlanned { first_frame: request.parameters.first_frame, warnings, plan }),
+            cameras: Some(CamerasPlanned {
+                first_frame: request.parameters.first_frame,
+                choice: request.choice,
+                parameters: Some(request.parameters),
+                warnings,
+                plan,
+            }),
         }),
         None => ChildJob::new(&FitShape { request, warnings, plan }),
     };

@@ -105,6 +105,9 @@ fn check(report: &Value, expected: &Expected) -> Result<()> {
         let learned = object(&report[learned])?;
         ensure!(learned["version"].is_i64() && learned["blake3"].as_str().is_some_and(|b| b.len() == 64));
     }
+    if expected.subject == "session" {
+        ensure!(object(&subject["reading"])?.contains_key("up"), "how the files were read");
+    }
     ensure!(!object(&report["parameters"])?.is_empty(), "parameters");
     ensure!(report["seeds"].is_array() && report["warnings"].is_array(), "seeds and warnings");
     let workers = report["workers"].as_array().context("no workers")?;

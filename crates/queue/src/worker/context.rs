@@ -66,8 +66,11 @@ impl JobContext {
     /// [`JobError::GiveUp`] if it is not a `J`, or of a version that a `J` can't be made of: bad input, not a crash.
     pub(super) fn read<J: Job>(&self) -> Result<J, JobError> {
         let ClaimedJob { kind, payload, payload_version: version, .. } = &*self.job;
-        let unreadable =
-            |error| JobError::give_up(format!("the payload of this {kind} job cannot be read"), error);
+        let unreadable = |error: serde_json::Error| {
+            let message =
+                format!("the payload of this {kind} job cannot be read: {error}; start the run again");
+            JobError::give_up(message, error)
+        };
         if *version == J::VERSION {
             return J::deserialize(payload).map_err(unreadable);
         }

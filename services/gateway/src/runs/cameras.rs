@@ -2,7 +2,8 @@ use std::collections::BTreeMap;
 
 use formats::FileRole;
 use jobs::{
-    InputFile, body_model::SHIPPED, inverse_kinematics::InverseKinematics, multi_view::PlanMultiView,
+    CameraChoice, InputFile, body_model::SHIPPED, inverse_kinematics::InverseKinematics,
+    multi_view::PlanMultiView,
 };
 use multi_view::Parameters;
 use serde::{Deserialize, Serialize};
@@ -96,9 +97,11 @@ impl CameraFields {
         Ok(PlanMultiView {
             inputs: on.inputs(up),
             body_model: body_model.ready()?,
-            cameras: self.cameras,
-            camera_files: self.camera_files,
-            metres_per_unit: self.metres_per_unit,
+            choice: CameraChoice {
+                cameras: self.cameras,
+                camera_files: self.camera_files,
+                metres_per_unit: self.metres_per_unit,
+            },
             parameters,
             inverse_kinematics,
         })

@@ -20,6 +20,7 @@ use super::{
     MAX_STEPS,
     evidence::{self, Frames},
     finished::Finished,
+    outliers::{self, Outlier},
     report,
 };
 use crate::{InputError, Shared, plan_job};
@@ -163,7 +164,19 @@ impl IkHandler {
                 return Err(InputError::TooLong { frames: frames.count, limit });
             }
             let figure = Figure::body(&model, &shape, &chosen.points)?;
-            let measured = evidence::resampled(&chosen.trajectories, &chosen.points, frames);
+            let mut measured = evidence::resampled(&chosen.trajectories, &chosen.points, frames);
+            let out = outliers::remove(&mut measured, shape.measurements(&model).stature_m);
+            if let Some(Outlier { frame, point }) = out.first() {
+                warnings.push(format!(
+                    "{} samples of measured points are farther from the others than a body reaches and are taken as not measured; \
+                     the first: {} in frame {frame}",
+                    out.len(),
+                    chosen.points[*point].name
+                ));
+            }
+            if measured.iter().flatten().all(|position| position.x.is_nan()) {
+                return Err(out_of_range("frames with a measured point", 0.0, "1 or more"));
+            }
             Ok(Problem { shape, figure, points: chosen.points, frames, measured, warnings, model })
         });
         Ok(read.await?)
