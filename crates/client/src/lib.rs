@@ -2,6 +2,7 @@
 
 mod latency;
 pub mod live;
+pub mod numbers;
 pub mod parameters;
 mod rest;
 mod server;

@@ -8,7 +8,10 @@ use std::{
 use ::body::{BodyModel, LearnOptions, Sex, Wanted};
 use anyhow::{Context, bail};
 use body::{ScanOptions, ScanSet, shipped};
-use client::{Client, Run, ServerArgs, encode};
+use client::{
+    Client, Run, ServerArgs, encode,
+    numbers::{finite, positive},
+};
 use formats::archive::{self, Entry, Limits};
 use serde_json::{Value, json};
 
@@ -67,7 +70,7 @@ pub struct LearnArgs {
     #[arg(long, default_value_t = ::body::MAX_COMPONENTS)]
     components: usize,
     /// Length of one unit of the scans, in metres [default: 1; for NPY it is worked out]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
     unit: Option<f64>,
     /// Show the progress and wait until it is learned
     #[arg(long, short)]
@@ -83,19 +86,19 @@ pub struct SampleArgs {
     #[arg(long, default_value = jobs::body_model::SHIPPED)]
     model: String,
     /// Stature in metres
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
     stature: Option<f64>,
     /// Mass in kilograms
-    #[arg(long, value_name = "KG")]
+    #[arg(long, value_name = "KG", value_parser = positive)]
     mass: Option<f64>,
     /// Age in years
-    #[arg(long, value_name = "YEARS")]
+    #[arg(long, value_name = "YEARS", value_parser = positive)]
     age: Option<f64>,
     /// female or male
     #[arg(long)]
     sex: Option<Sex>,
     /// Coefficients of the components, in standard deviations, instead of measurements
-    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true, conflicts_with_all = ["stature", "mass", "age", "sex"])]
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true, conflicts_with_all = ["stature", "mass", "age", "sex"], value_parser = finite)]
     alpha: Vec<f64>,
     /// File to write: .glb (with skeleton and skin), .ply or .obj
     #[arg(long, short, value_name = "FILE")]

@@ -108,7 +108,8 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use clap::{Command, CommandFactory, Parser};
+    use clap::{Arg, Command, CommandFactory, Parser, builder::ValueParser};
+    use client::numbers::finite;
 
     use super::Cli;
 
@@ -127,6 +128,32 @@ mod tests {
         for inner in command.get_subcommands() {
             texts(inner, &format!("{path} {}", inner.get_name()), found);
         }
+    }
+
+    /// All options that are numbers with a fraction.
+    fn numbers(command: &Command, found: &mut Vec<Arg>) {
+        let of_number = ValueParser::new(finite).type_id();
+        found
+            .extend(command.get_arguments().filter(|a| a.get_value_parser().type_id() == of_number).cloned());
+        for inner in command.get_subcommands() {
+            numbers(inner, found);
+        }
+    }
+
+    #[test]
+    fn every_number_is_finite() {
+        let mut found = Vec::new();
+        numbers(&Cli::command(), &mut found);
+        for arg in &found {
+            for text in ["nan", "inf", "-inf"] {
+                let alone = Arg::new("number").long("number").value_parser(arg.get_value_parser().clone());
+                let parsed = Command::new("marey").arg(alone);
+                let error = parsed.try_get_matches_from(["marey", &format!("--number={text}")]).unwrap_err();
+                let expected = format!("found {text:?}, expected a finite number");
+                assert!(error.to_string().contains(&expected), "{}: {error}", arg.get_id());
+            }
+        }
+        assert!(found.len() > 15, "only {} options are numbers", found.len());
     }
 
     fn examples(text: &str) -> impl Iterator<Item = &str> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::bail;
-use client::{Client, MotionDatabase, Run, ServerArgs, encode};
+use client::{Client, MotionDatabase, Run, ServerArgs, encode, numbers::positive};
 use serde_json::{Map, Value, json};
 
 use crate::{database_show, pack, watch, words::counted};
@@ -81,7 +81,7 @@ struct BuildOptions {
     #[arg(long, value_name = "N")]
     shards: Option<usize>,
     /// Length of one unit of BVH files, in metres; the files don't say it [default: 0.01, centimetres]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
     bvh_metres_per_unit: Option<f64>,
     /// Show the progress and wait until it is built
     #[arg(long, short)]
@@ -147,7 +147,7 @@ impl std::str::FromStr for Augmentation {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match (text, text.strip_prefix("warp=").map(str::parse::<f64>)) {
+        match (text, text.strip_prefix("warp=").map(positive)) {
             ("mirror", _) => Ok(Self::Mirror),
             ("warp", _) => Ok(Self::Warp),
             (_, Some(Ok(speed))) => Ok(Self::WarpTo(speed)),
@@ -318,7 +318,7 @@ mod tests {
         let read = |text: &str| text.split(',').map(str::parse).collect::<Result<Vec<Augmentation>, _>>();
         assert_eq!(augment(&read("mirror,warp").unwrap()), json!({"mirror": true, "warps": [0.8, 1.25]}));
         assert_eq!(augment(&read("warp=0.9").unwrap()), json!({"mirror": false, "warps": [0.9]}));
-        for bad in ["mirrors", "warp=", "warp=fast", ""] {
+        for bad in ["mirrors", "warp=", "warp=fast", "warp=nan", "warp=inf", "warp=0", ""] {
             assert!(read(bad).is_err(), "{bad:?}");
         }
     }

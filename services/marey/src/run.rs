@@ -5,6 +5,7 @@ use body::Sex;
 use clap::builder::PossibleValuesParser;
 use client::{
     Client, Run, ServerArgs,
+    numbers::positive,
     parameters::{pairs, values},
 };
 use serde_json::{Map, Value, json};
@@ -91,7 +92,7 @@ struct SparseArgs {
     #[arg(long, value_name = "NUMBER")]
     neighbours: Option<u32>,
     /// Length of one unit of BVH files, in metres [default: 0.01, centimetres]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
     bvh_unit: Option<f64>,
 }
 
@@ -113,7 +114,7 @@ struct CameraArgs {
     #[arg(long)]
     background: Option<String>,
     /// Length of one unit of the calibration, in metres, if its file doesn't say it
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
     calibration_unit: Option<f64>,
 }
 
@@ -129,16 +130,16 @@ struct InverseKinematicsArgs {
     #[arg(long)]
     steps: Option<u32>,
     /// Frames per second to solve [default: those of the cameras, otherwise those of the file of points]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = positive)]
     frame_rate: Option<f64>,
     /// The person's stature in metres
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
     stature: Option<f64>,
     /// The person's mass in kilograms
-    #[arg(long, value_name = "KG")]
+    #[arg(long, value_name = "KG", value_parser = positive)]
     mass: Option<f64>,
     /// The person's age in years
-    #[arg(long, value_name = "YEARS")]
+    #[arg(long, value_name = "YEARS", value_parser = positive)]
     age: Option<f64>,
     /// female or male
     #[arg(long)]

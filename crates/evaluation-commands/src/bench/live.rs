@@ -11,6 +11,7 @@ use anyhow::{Context, bail, ensure};
 use client::{
     Client, Latency, MotionDatabase, Server, ServerArgs,
     live::{Connection, frame_message},
+    numbers::positive,
     parameters::values,
 };
 use nalgebra::Vector3;
@@ -39,10 +40,10 @@ pub struct Args {
     #[arg(long, default_value_t = 8)]
     streams: usize,
     /// Frames a second of each
-    #[arg(long, default_value_t = 60.0)]
+    #[arg(long, default_value_t = 60.0, value_parser = positive)]
     fps: f64,
     /// How long, after all streams were opened
-    #[arg(long, default_value_t = 20.0)]
+    #[arg(long, default_value_t = 20.0, value_parser = positive)]
     seconds: f64,
     /// Control points, 2 to 6
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(2..=6))]

@@ -13,6 +13,7 @@ use std::{
 
 use anyhow::{Context, bail};
 use body::BodyModel;
+use client::numbers::positive;
 use evaluation::training_poses::training_poses;
 use model::{Camera, Silhouette};
 use motion_db::Clip;
@@ -78,7 +79,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
     /// Frames a second of these films
-    #[arg(long, value_name = "RATE", default_value_t = 15.0)]
+    #[arg(long, value_name = "RATE", default_value_t = 15.0, value_parser = positive)]
     rate: f64,
 }
 

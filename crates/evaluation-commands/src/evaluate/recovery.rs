@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use body::BodyModel;
 use clap::ValueEnum;
+use client::numbers::finite;
 use evaluation::recovery::{Limbs, Method, Setting, recover};
 use tracking::built_in_poses;
 use vision::scene::Ring;
@@ -43,7 +44,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Part::Report)]
     part: Part,
     /// How far limbs are turned in each angle, degrees
-    #[arg(long, value_delimiter = ',', default_value = "10,20,40", value_name = "DEGREES")]
+    #[arg(long, value_delimiter = ',', default_value = "10,20,40", value_name = "DEGREES", value_parser = finite)]
     turned: Vec<f64>,
     /// Which limbs are turned
     #[arg(long, value_enum, value_delimiter = ',', default_value = "arm,arms,leg")]

@@ -1,6 +1,7 @@
 //! What `marey evaluate sparse` varies, as given on the command line.
 
 use anyhow::{Context, bail};
+use client::numbers::not_negative;
 use evaluation::{Occlusion, Sweep, Variant};
 use serde_json::Value;
 use sparse::{Method, Parameters};
@@ -24,7 +25,7 @@ pub struct SweepArgs {
     #[arg(long, value_delimiter = ',', value_name = "POSES")]
     database_size: Vec<String>,
     /// Gaussian noise on the control points, standard deviation of each coordinate, millimetres
-    #[arg(long, value_delimiter = ',', value_name = "MM", default_value = "0")]
+    #[arg(long, value_delimiter = ',', value_name = "MM", default_value = "0", value_parser = not_negative)]
     noise_mm: Vec<f64>,
     /// Tell the reconstruction how noisy the points are
     #[arg(long)]
