@@ -6,12 +6,15 @@ use std::{
 };
 
 use anyhow::Context;
-use client::{Client, ResultFile, ServerArgs, encode};
+use client::{Client, ResultFile, Run, ServerArgs, encode};
+
+use crate::watch;
 
 /// List or download the results of a run
 ///
 /// For Blender: File > Import > Motion Capture (.bvh), then motion.bvh. Of a session with cameras, look at
-/// overlay_CAMERA.mp4 first; body.glb opens in Blender by File > Import > glTF 2.0.
+/// overlay_CAMERA.mp4 first; body.glb opens in Blender by File > Import > glTF 2.0. If the run failed or was cancelled, this
+/// says so and fails too, after what there is.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey results \"take 3\"                # lists them
@@ -29,18 +32,21 @@ pub struct Args {
 /// Runs `marey results`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
-    let run = client.find_run(&args.run)?;
+    let id = client.find_run(&args.run)?;
+    // asked first: if it ends meanwhile, its results are there
+    let run: Run = client.get(&format!("/v1/runs/{}", encode(&id)))?;
     let results = match &args.output {
-        Some(folder) => download(&client, &run, folder)?,
-        None => list(&client, &run)?,
+        Some(folder) => download(&client, &id, folder)?,
+        None => list(&client, &id)?,
     };
-    if results.is_empty() {
-        println!("no results yet; see `marey status {run}`");
-    }
-    for result in results {
+    for result in &results {
         let shown =
             args.output.as_ref().map_or(result.name.clone().into(), |folder| folder.join(&result.name));
         println!("{:>12} bytes  {}", result.bytes, shown.display());
+    }
+    watch::not_in_vain(&run.state, run.error.as_deref())?;
+    if results.is_empty() {
+        println!("no results yet; see `marey status {id}`");
     }
     Ok(())
 }
@@ -51,8 +57,10 @@ fn list(client: &Client, run: &str) -> anyhow::Result<Vec<ResultFile>> {
 
 /// Downloads all results of a run into a folder.
 pub fn download(client: &Client, run: &str, folder: &Path) -> anyhow::Result<Vec<ResultFile>> {
-    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let results = list(client, run)?;
+    if !results.is_empty() {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    }
     for result in &results {
         let name = Path::new(&result.name).file_name().context("a result without a name")?;
         let path = format!("/v1/runs/{}/results/{}", encode(run), encode(&result.name));

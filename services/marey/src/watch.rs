@@ -48,10 +48,18 @@ pub fn until_end(client: &Client, run_id: &str) -> anyhow::Result<()> {
 /// As [`until_end`].
 pub fn until_end_with(client: &Client, run_id: &str, show: impl FnMut(&Progress)) -> anyhow::Result<()> {
     let end = follow(client, run_id, show)?;
-    match end.state.as_str() {
-        "succeeded" => Ok(()),
-        "failed" => bail!("the run failed: {}", end.error.unwrap_or_default()),
-        state => bail!("the run was {state}"),
+    not_in_vain(&end.state, end.error.as_deref())
+}
+
+/// That a run has succeeded, or may yet.
+///
+/// # Errors
+/// If it has failed or was cancelled.
+pub fn not_in_vain(state: &str, error: Option<&str>) -> anyhow::Result<()> {
+    match state {
+        "failed" => bail!("the run failed: {}", error.unwrap_or("nobody said why")),
+        "cancelled" => bail!("the run was cancelled"),
+        _ => Ok(()),
     }
 }
 
@@ -130,6 +138,25 @@ impl Display {
     pub fn close(self) {
         if let Kind::Bar(bar) = self.0 {
             bar.finish_and_clear();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::not_in_vain;
+
+    #[test]
+    fn a_run_that_gives_nothing_more_is_an_error_that_says_why() {
+        let error = |state, why| not_in_vain(state, why).unwrap_err().to_string();
+        assert_eq!(
+            error("failed", Some("points.csv has no frame")),
+            "the run failed: points.csv has no frame"
+        );
+        assert_eq!(error("failed", None), "the run failed: nobody said why");
+        assert_eq!(error("cancelled", None), "the run was cancelled");
+        for state in ["queued", "running", "succeeded"] {
+            assert!(not_in_vain(state, None).is_ok(), "{state}");
         }
     }
 }
