@@ -1,7 +1,6 @@
 //! `marey demo`: the whole way, once, on motion whose truth is known.
 
 mod cameras;
-mod folder;
 mod held_out;
 mod strip;
 mod summary;
@@ -17,13 +16,10 @@ use anyhow::{Context, bail};
 use client::{Client, MotionDatabase};
 use service::config::{TelemetryConfig, Variables, environment};
 
-use self::{
-    folder::{new_folder, remove},
-    held_out::HeldOut,
-    summary::Summary,
-};
+use self::{held_out::HeldOut, summary::Summary};
 use crate::{
     database,
+    folders::{new_folder, remove},
     sample::Trials,
     serve::runtime,
     take::Take,

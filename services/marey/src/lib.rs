@@ -8,6 +8,7 @@ mod cmu;
 mod database;
 mod database_show;
 mod demo;
+mod folders;
 mod health;
 mod keys;
 mod live;

@@ -15,7 +15,7 @@ use sample_motion::{Action, DrawOptions, FRAME_RATE, Model};
 use serde_json::{Value, json};
 use vision::scene::{Ring, silhouettes};
 
-use crate::words::counted;
+use crate::{folders::empty_folder, words::counted};
 
 /// Frames of drawn motion from one picture to the next: 30 pictures a second.
 const STEP: usize = 2;
@@ -40,7 +40,7 @@ const STATURES_M: [f64; 5] = [1.58, 1.66, 1.73, 1.79, 1.86];
   marey upload \"synthetic walk\" capture/calibration.json capture/silhouettes/
   marey run \"synthetic walk\" --set frame_rate=30 --watch   # silhouettes have no rate")]
 pub struct Args {
-    /// Folder to write to
+    /// New folder to write to, or an empty one
     #[arg(long)]
     out: PathBuf,
     /// Number of cameras, in a circle around the person
@@ -65,6 +65,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         action: args.action,
         seed: args.seed,
     };
+    empty_folder(&args.out)?;
     let bar = ProgressBar::new(args.frames.into());
     capture.write(&args.out, || bar.inc(1))?;
     bar.finish_and_clear();
@@ -146,4 +147,21 @@ fn put(path: &Path, content: &[u8]) -> anyhow::Result<()> {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }
     fs::write(path, content).with_context(|| path.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn captures_are_not_mixed() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("capture");
+        let draw =
+            |cameras| run(&Args { out: out.clone(), cameras, frames: 1, action: Action::Walk, seed: 1 });
+        draw(3).unwrap();
+        let refused = draw(2).unwrap_err().to_string();
+        assert!(refused.ends_with("capture is not empty; choose a new folder"), "{refused}");
+        assert_eq!(fs::read_dir(out.join("silhouettes")).unwrap().count(), 3);
+    }
 }

@@ -105,6 +105,7 @@ pub const SETUPS: &[(&str, &str)] = &[
     ("marey run", TAKE_3),
     ("marey run", TAKE_4),
     ("marey run", MARKERS),
+    ("marey sample-capture", "rm -r capture"),
     ("marey status", WALKS),
     ("marey status", TAKE_3),
     ("marey status", RUN),

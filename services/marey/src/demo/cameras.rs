@@ -11,7 +11,7 @@ use sample_motion::Action;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::folder::remove;
+use crate::folders::remove;
 use crate::{results, sample_capture::SampleCapture, session_files, upload, watch};
 
 /// Folder of the results.

@@ -1,4 +1,4 @@
-//! Folders of the demo.
+//! Folders that commands write to.
 
 use std::{
     fs,
@@ -8,14 +8,23 @@ use std::{
 
 use anyhow::{Context, bail};
 
+/// Makes a folder for a command's files alone, which must not be there unless it is empty.
+///
+/// # Errors
+/// If it has something in it, which stays as it is.
+pub fn empty_folder(folder: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    if fs::read_dir(folder).with_context(|| folder.display().to_string())?.next().is_some() {
+        bail!("{} is not empty; choose a new folder", folder.display());
+    }
+    Ok(())
+}
+
 /// Makes a folder for results: the one asked for, which must not be there unless it is empty, or the first free one of `name`,
 /// `name-2`, `name-3` and so on. What was there before stays as it is.
 pub fn new_folder(asked: Option<&Path>, name: &str) -> anyhow::Result<PathBuf> {
     if let Some(folder) = asked {
-        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        if fs::read_dir(folder).with_context(|| folder.display().to_string())?.next().is_some() {
-            bail!("{} is not empty; choose a new folder", folder.display());
-        }
+        empty_folder(folder)?;
         return Ok(folder.to_owned());
     }
     for number in 1_u64.. {
