@@ -5,4 +5,5 @@
 pub mod bench;
 pub mod evaluate;
 mod motions;
+mod outputs;
 mod progress;

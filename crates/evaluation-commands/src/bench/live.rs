@@ -63,7 +63,7 @@ pub struct Args {
     /// Send the frames of all streams at the same moment, instead of evenly spread
     #[arg(long)]
     aligned: bool,
-    /// Write the numbers there too
+    /// Write the numbers to this file too; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]

@@ -66,7 +66,7 @@ pub struct Args {
     /// At most this many trials, spread evenly over their names
     #[arg(long, default_value_t = 24)]
     trials: usize,
-    /// Write the numbers to this file
+    /// Write the numbers to this file; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }

@@ -11,7 +11,7 @@ use library::AllCores;
 use motion_db::{Augment, Clip, IndexFile, MotionDatabase, write_index};
 use serde::Serialize;
 
-use crate::motions;
+use crate::{motions, outputs::distinct};
 use pass::{Measured, Search, Truth, measure};
 use questions::Run;
 
@@ -50,10 +50,10 @@ pub struct Args {
     /// Frames of each trial to search for, from its middle
     #[arg(long, default_value_t = 60)]
     frames: usize,
-    /// Keep the index file here
+    /// Keep the index file here; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     index: Option<PathBuf>,
-    /// Write the numbers to this file
+    /// Write the numbers to this file; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -93,6 +93,7 @@ struct Report {
 
 /// Runs `marey bench search`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    distinct(&[("--index", args.index.as_ref()), ("--json", args.json.as_ref())])?;
     let queries = motions::read(&args.query)?;
     let performers: HashSet<&str> = queries.iter().map(|c| c.subject.as_str()).collect();
     let begin = Instant::now();

@@ -35,7 +35,7 @@ pub struct Args {
     /// Which of the trials: those the defaults were tuned on, the others, or all
     #[arg(long, value_enum, default_value_t = Part::All)]
     part: Part,
-    /// Write the numbers of every trial to this file
+    /// Write the numbers of every trial to this file; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }

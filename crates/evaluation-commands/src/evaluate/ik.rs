@@ -41,7 +41,7 @@ pub struct Args {
     /// Only the first frames of each trial, at 30 a second
     #[arg(long, default_value_t = 400, value_name = "N")]
     frames: usize,
-    /// Write the errors to this file
+    /// Write the errors to this file; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }

@@ -23,7 +23,7 @@ use tracking::{ObservedFrame, Options, Part, ParticleOptions, Tracked, Tracker, 
 use vision::scene::SilhouetteNoise;
 
 use super::{capture::Folder, recovery, shape, written::write};
-use crate::{motions, progress::Progress};
+use crate::{motions, outputs::distinct, progress::Progress};
 use film::Film;
 use joints::{JointErrors, Joints};
 use report::{FrameReport, Report, Settings, Times};
@@ -72,10 +72,11 @@ pub struct Args {
     /// Measure how long a particle search takes in every N-th frame, without using what it finds; 0 for none
     #[arg(long, value_name = "N", default_value_t = 8)]
     time_search_every: usize,
-    /// Write the errors to this file
+    /// Write the errors to this file; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a film for each camera, with the outline of the body found, to this folder
+    /// Write a film for each camera, with the outline of the body found, to this folder; those of the
+    /// same names are replaced
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
     /// Frames a second of these films
@@ -85,6 +86,7 @@ pub struct Args {
 
 /// Runs `marey evaluate multiview`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    distinct(&[("--model", args.model.as_ref()), ("--json", args.json.as_ref())])?;
     let model = shape::model(args.model.as_ref())?;
     let folder = Folder::open(&args.folder, &args.cameras)?;
     let mut frames = folder.frames();

@@ -61,7 +61,7 @@ pub struct Args {
     /// A different seed gives different bodies and particles; the same seed gives the same
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Write the distances of every start to this file
+    /// Write the distances of every start to this file; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }

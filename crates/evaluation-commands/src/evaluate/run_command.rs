@@ -20,6 +20,7 @@ use super::{
     run_truth::{File, only, true_motion},
     written::{command, write},
 };
+use crate::outputs::distinct;
 
 /// Most bytes of an unpacked file.
 const MAX_BYTES: u64 = 2 << 30;
@@ -42,10 +43,11 @@ pub struct Args {
     /// session's ground-truth file]
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Write a report to this file: one page with tables and plots, to be opened in a browser
+    /// Write a report to this file, one page with tables and plots, to be opened in a browser; what was in the file is
+    /// replaced
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Write the errors, by frame and by joint, to this file
+    /// Write the errors, by frame and by joint, to this file; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
@@ -81,6 +83,11 @@ struct Json<'a> {
 
 /// Runs `marey evaluate run`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    distinct(&[
+        ("--truth", args.truth.as_ref()),
+        ("--html", args.html.as_ref()),
+        ("--json", args.json.as_ref()),
+    ])?;
     let client = Client::new(args.server.server()?);
     let run: Run = client.get(&format!("/v1/runs/{}", client.find_run(&args.run)?))?;
     if run.state != "succeeded" {

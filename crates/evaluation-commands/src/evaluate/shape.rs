@@ -23,6 +23,7 @@ use super::{
     overlay::{drawn, overlay},
     written::write,
 };
+use crate::outputs::distinct;
 
 /// `marey evaluate shape`
 #[derive(Debug, clap::Args)]
@@ -53,10 +54,11 @@ pub struct Args {
     /// Which frame of the capture
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
-    /// Write the errors to this file
+    /// Write the errors to this file; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a picture for each camera, with the outline of the body found, to this folder
+    /// Write a picture for each camera, with the outline of the body found, to this folder; those of
+    /// the same names are replaced
     #[arg(long, value_name = "DIR", conflicts_with = "scans")]
     overlay: Option<PathBuf>,
     /// Folder of registered scans: vertices.npy, faces.npy, joints.npy and scans.csv, with rig.json, skin_joints.npy and
@@ -89,6 +91,7 @@ struct CameraJson<'a> {
 
 /// Runs `marey evaluate shape`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    distinct(&[("--model", args.model.as_ref()), ("--json", args.json.as_ref())])?;
     let Some(folder) = &args.folder else {
         let Some(scans) = &args.scans else { bail!("give either DIR or --scans") };
         if !args.cameras.is_empty() || args.frame != 0 {

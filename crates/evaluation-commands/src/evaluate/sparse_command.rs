@@ -103,6 +103,7 @@ fn positive(text: &str) -> Result<usize, String> {
 
 /// Runs `marey evaluate sparse`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    args.written.check()?;
     let sweep = args.sweep.sweep()?;
     let mut train = augmented(motions::read(&args.train)?, &args.augment)?;
     if sweep.database_sizes != [None] {

@@ -12,16 +12,19 @@ use serde::Serialize;
 use serde_json::Value;
 use sparse::Parameters;
 
+use crate::outputs::distinct;
+
 /// Files to be written.
 #[derive(Debug, clap::Args)]
 pub struct Written {
-    /// Write rows, tables and the errors of each trial to this file
+    /// Write rows, tables and the errors of each trial to this file; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the tables to this file, as Markdown
+    /// Write the tables to this file, as Markdown; what was in it is replaced
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-    /// Write a report to this file: one page with tables and plots, to be opened in a browser
+    /// Write a report to this file, one page with tables and plots, to be opened in a browser; what was in the file is
+    /// replaced
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
 }
@@ -189,6 +192,15 @@ fn quoted(argument: String) -> String {
 }
 
 impl Written {
+    /// That each has a file of its own: known before the evaluation takes its time.
+    pub fn check(&self) -> anyhow::Result<()> {
+        distinct(&[
+            ("--json", self.json.as_ref()),
+            ("--markdown", self.markdown.as_ref()),
+            ("--html", self.html.as_ref()),
+        ])
+    }
+
     /// Writes what was asked for.
     pub fn write(&self, outcome: &Outcome<'_>) -> anyhow::Result<()> {
         let evaluation = outcome.evaluation;
