@@ -28,12 +28,14 @@ impl Latency {
 
 impl fmt::Display for Latency {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = self.sorted.len();
+        write!(f, "{} frames, {count} poses, {} dropped", self.frames, self.dropped)?;
+        if count == 0 {
+            return Ok(());
+        }
         write!(
             f,
-            "{} frames, {} poses, {} dropped; latency p50 {:.2} ms, p95 {:.2} ms, p99 {:.2} ms, max {:.2} ms",
-            self.frames,
-            self.sorted.len(),
-            self.dropped,
+            "; latency p50 {:.2} ms, p95 {:.2} ms, p99 {:.2} ms, max {:.2} ms",
             self.quantile_ms(0.5),
             self.quantile_ms(0.95),
             self.quantile_ms(0.99),
@@ -53,5 +55,16 @@ mod tests {
             assert!((latency.quantile_ms(share) - expected).abs() < 1e-9);
         }
         assert!(Latency::from_seconds(vec![], 0, 0).quantile_ms(0.5).is_nan());
+    }
+
+    #[test]
+    fn latencies_are_shown_where_there_are_some() {
+        let of = |seconds: &[f64], frames| Latency::from_seconds(seconds.to_vec(), frames, 2).to_string();
+        assert_eq!(of(&[], 2), "2 frames, 0 poses, 2 dropped");
+        let shown = of(&[0.001], 3);
+        assert!(
+            shown.starts_with("3 frames, 1 poses, 2 dropped; latency p50 1.00 ms, p95 1.00 ms"),
+            "{shown}"
+        );
     }
 }

@@ -23,8 +23,8 @@ use client::{
     parameters::values,
 };
 
-use crate::serve::runtime;
-use source::Source;
+use crate::{serve::runtime, words::counted};
+use source::{Measured, Source};
 
 /// After a connection was lost: from the first attempt to the next one, doubled up to the longest wait.
 const FIRST_WAIT: Duration = Duration::from_millis(200);
@@ -143,6 +143,7 @@ async fn follow(args: &Args, server: &Server, source: Source, mut start: Value) 
         let from = if start["state"].is_null() { "anew" } else { "from the last state" };
         eprintln!("marey: connected again; going on {from} with frame {}", feed.frame + 1);
     }
+    feed.check()?;
     eprintln!("{}", Latency::from_seconds(answers.latencies, feed.frame, answers.dropped));
     Ok(())
 }
@@ -261,6 +262,8 @@ struct Feed {
     clock: Interval,
     /// number of the last frame sent
     frame: u64,
+    /// whether a point was measured in any of them
+    has_measured: bool,
     begin: Instant,
 }
 
@@ -268,7 +271,27 @@ impl Feed {
     fn new(source: Source, begin: Instant) -> Self {
         let mut clock = tokio::time::interval(Duration::from_secs_f64(1.0 / 60.0));
         clock.set_missed_tick_behavior(MissedTickBehavior::Burst);
-        Self { source, clock, frame: 0, begin }
+        Self { source, clock, frame: 0, has_measured: false, begin }
+    }
+
+    /// That there was something to follow.
+    ///
+    /// # Errors
+    /// If there was no frame, or no point in any.
+    fn check(&self) -> anyhow::Result<()> {
+        ensure!(self.frame > 0, "the points have no frame, expected at least one after the names");
+        ensure!(self.has_measured, "no point was measured in any of {}", counted(self.frame, "frame"));
+        Ok(())
+    }
+
+    /// The next frame, counted.
+    async fn next(&mut self) -> anyhow::Result<Option<Measured>> {
+        let next = self.source.next().await?;
+        if let Some(measured) = &next {
+            self.frame += 1;
+            self.has_measured |= measured.has_point();
+        }
+        Ok(next)
     }
 
     /// Sends frames until there are no more, or nobody takes them: the other side says why.
@@ -277,8 +300,7 @@ impl Feed {
             if self.source.is_file() {
                 self.clock.tick().await;
             }
-            let Some(measured) = self.source.next().await? else { break };
-            self.frame += 1;
+            let Some(measured) = self.next().await? else { break };
             let time = self.begin.elapsed().as_secs_f64();
             if sender.send(frame_message(self.frame, time, measured.samples())).await.is_err() {
                 return Ok(());
@@ -319,6 +341,22 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         let missing = replace_file(&folder.path().join("none/performer.state"), b"").unwrap_err();
         assert!(format!("{missing:#}").contains("performer.state"));
+    }
+
+    #[tokio::test]
+    async fn frames_without_a_point_are_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("points.csv");
+        let rows = |x: &str| format!("time,head_x,head_y,head_z\n0.0,{x},1,0\n0.016666667,{x},1,0\n");
+        for (x, expected) in [("1", ""), ("", "no point was measured in any of 2 frames")] {
+            fs::write(&path, rows(x)).unwrap();
+            let mut feed = Feed::new(Source::open(&path, &[]).unwrap(), Instant::now());
+            assert!(feed.check().unwrap_err().to_string().contains("no frame"));
+            while let Some(measured) = feed.next().await.unwrap() {
+                assert_eq!(measured.has_point(), x == "1");
+            }
+            assert_eq!(feed.check().map_or_else(|error| error.to_string(), |()| String::new()), expected);
+        }
     }
 
     #[tokio::test]

@@ -26,6 +26,11 @@ pub struct Measured {
 }
 
 impl Measured {
+    /// Whether any of the points was measured.
+    pub fn has_point(&self) -> bool {
+        self.positions.iter().any(|position| position.iter().all(|coordinate| coordinate.is_finite()))
+    }
+
     /// All of it.
     pub fn samples(&self) -> Samples<'_> {
         Samples { positions: &self.positions, sigmas: &self.sigmas }
