@@ -25,7 +25,9 @@ pub enum Error {
         limit: usize,
     },
     /// Another process runs a cluster in this folder.
-    #[error("{0} is in use by another process")]
+    #[error(
+        "{0} is in use: another Marey runs on this folder; stop it, or choose another folder (--data-dir)"
+    )]
     InUse(PathBuf),
     /// The data were written by another major version of PostgreSQL.
     #[error("{data_dir} was made by PostgreSQL {found}, but only {installed} is installed")]
