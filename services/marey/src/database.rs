@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::bail;
-use client::{Client, MotionDatabase, Run, ServerArgs, encode, numbers::positive};
+use client::{Client, MotionDatabase, Run, ServerArgs, encode, numbers::positive, parameters::values};
 use serde_json::{Map, Value, json};
 
 use crate::{database_show, pack, watch, words::counted};
@@ -271,13 +270,7 @@ fn start(
 
 fn train(args: &TrainArgs) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
-    let mut parameters = Map::new();
-    for set in &args.set {
-        let Some((name, value)) = set.split_once('=') else {
-            bail!("--set {set}: expected NAME=VALUE, such as latent_dims=4");
-        };
-        parameters.insert(name.to_owned(), serde_json::from_str(value).unwrap_or_else(|_| value.into()));
-    }
+    let parameters = values(&args.set)?;
     let path = format!("/v1/motion-databases/{}/train", encode(&args.which));
     let run: Run = client.post(&path, &json!({ "method": "gplvm", "parameters": parameters }))?;
     println!("training in run {}", run.id);

@@ -88,7 +88,7 @@ fn start(args: &Args, points: &[String]) -> anyhow::Result<Value> {
     if let Some(path) = &args.skeleton {
         start["skeleton_asf"] = fs::read_to_string(path).with_context(|| path.display().to_string())?.into();
     }
-    start["parameters"] = values(&args.parameters)?;
+    start["parameters"] = values(&args.parameters)?.into();
     if let Some(path) = args.state_file.as_ref().filter(|path| path.exists()) {
         let state = fs::read(path).with_context(|| path.display().to_string())?;
         ensure!(!state.is_empty(), "{} is empty, expected a live state", path.display());

@@ -6,10 +6,11 @@ use std::{
 };
 
 use anyhow::{Context, bail};
+use client::parameters;
 use formats::{PointsOptions, Read, session};
 use markers::{Fit, MarkerMap, fits};
 use model::{Axis, PointTrajectories};
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
 use crate::words::counted;
 
@@ -196,9 +197,7 @@ pub fn request(given: &[String]) -> anyhow::Result<Map<String, Value>> {
             request.insert("marker_set".to_owned(), name.clone().into());
         }
         (count, all) if count == all.len() => {
-            let pairs = pairs.iter().filter_map(|pair| pair.split_once('='));
-            let pairs: Map<_, _> =
-                pairs.map(|(marker, point)| (marker.trim().to_owned(), json!(point.trim()))).collect();
+            let pairs = parameters::pairs(all, "MARKER=POINT", |point| point.into())?;
             request.insert("mapping".to_owned(), pairs.into());
         }
         _ => bail!("--map takes one file, one marker set, or any number of MARKER=POINT"),
@@ -208,6 +207,8 @@ pub fn request(given: &[String]) -> anyhow::Result<Map<String, Value>> {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     fn asked(given: &[&str]) -> anyhow::Result<Value> {
@@ -234,8 +235,13 @@ mod tests {
 
     #[test]
     fn a_map_that_is_nothing_or_several_things_is_refused() {
-        for given in [&["nobody"][..], &["a=b", "plug-in-gait"], &["cmu-41", "plug-in-gait"], &["gone.toml"]]
-        {
+        for given in [
+            &["nobody"][..],
+            &["a=b", "plug-in-gait"],
+            &["cmu-41", "plug-in-gait"],
+            &["gone.toml"],
+            &["a=b", "a=c"],
+        ] {
             assert!(asked(given).is_err(), "{given:?}");
         }
     }

@@ -200,7 +200,9 @@ fn request(args: &Args) -> anyhow::Result<Value> {
         (
             "camera_files",
             (!args.cameras.camera_files.is_empty())
-                .then(|| pairs(&args.cameras.camera_files, |name| name.into()))
+                .then(|| {
+                    pairs(&args.cameras.camera_files, "FILE=CAMERA", |name| name.into()).map(Value::Object)
+                })
                 .transpose()?,
         ),
         ("background", args.cameras.background.as_ref().map(|kind| json!(kind))),
@@ -215,7 +217,7 @@ fn request(args: &Args) -> anyhow::Result<Value> {
         (
             "parameters",
             // a number or true where it reads as one, else a word
-            (!args.parameters.is_empty()).then(|| values(&args.parameters)).transpose()?,
+            (!args.parameters.is_empty()).then(|| values(&args.parameters).map(Value::Object)).transpose()?,
         ),
     ];
     for (name, value) in marker_sets::request(&args.points.mapping)? {

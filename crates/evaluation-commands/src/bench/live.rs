@@ -211,7 +211,7 @@ async fn stream_all(
     for performer in performers {
         let points = &POINTS[..usize::from(args.points)];
         let mut start = json!({ "type": "start", "points": points, "skeleton_asf": performer.skeleton_asf });
-        start["parameters"] = values(&args.parameters)?;
+        start["parameters"] = values(&args.parameters)?.into();
         streams.push((Connection::open(server, database, &start).await?, performer.frames));
     }
     let begin = Instant::now() + Duration::from_millis(100);

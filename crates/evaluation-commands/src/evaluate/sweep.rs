@@ -1,9 +1,8 @@
 //! What `marey evaluate sparse` varies, as given on the command line.
 
 use anyhow::{Context, bail};
-use client::numbers::not_negative;
+use client::{numbers::not_negative, parameters::values};
 use evaluation::{Occlusion, Sweep, Variant};
-use serde_json::Value;
 use sparse::{Method, Parameters};
 
 /// Methods, points, parameters, databases, noise and gaps. Whatever is given several values is compared in one table.
@@ -119,16 +118,11 @@ impl SweepArgs {
 /// The parameters with some set: a number or true where the value reads as one, else a word.
 fn with(parameters: &Parameters, settings: &[String]) -> anyhow::Result<Parameters> {
     let mut json = serde_json::to_value(parameters)?;
-    for setting in settings {
-        let Some((name, text)) = setting.split_once('=') else {
-            bail!("{setting:?} is not of the form NAME=VALUE");
-        };
-        let (name, text) = (name.trim(), text.trim());
-        let value: Value = serde_json::from_str(text).unwrap_or_else(|_| text.into());
+    for (name, value) in values(settings)? {
         if name == "method" {
             bail!("methods are compared by --method");
         }
-        json[name] = value;
+        json[&name] = value;
     }
     serde_json::from_value(json).with_context(|| settings.join(", "))
 }
