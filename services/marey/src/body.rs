@@ -98,7 +98,8 @@ pub struct SampleArgs {
     #[arg(long)]
     sex: Option<Sex>,
     /// Coefficients of the components, in standard deviations, instead of measurements
-    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true, conflicts_with_all = ["stature", "mass", "age", "sex"], value_parser = finite)]
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    #[arg(conflicts_with_all = ["stature", "mass", "age", "sex"])]
     alpha: Vec<f64>,
     /// File to write: .glb (with skeleton and skin), .ply or .obj
     #[arg(long, short, value_name = "FILE")]

@@ -44,7 +44,8 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Part::Report)]
     part: Part,
     /// How far limbs are turned in each angle, degrees
-    #[arg(long, value_delimiter = ',', default_value = "10,20,40", value_name = "DEGREES", value_parser = finite)]
+    #[arg(long, value_delimiter = ',', value_name = "DEGREES", value_parser = finite)]
+    #[arg(default_value = "10,20,40")]
     turned: Vec<f64>,
     /// Which limbs are turned
     #[arg(long, value_enum, value_delimiter = ',', default_value = "arm,arms,leg")]
