@@ -5,6 +5,8 @@ use axum::{
 };
 use serde::Serialize;
 
+use crate::refusal::Refusal;
+
 /// Why a request was not done. Every answer that is not a success is one of these, as RFC 9457 problem details.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -203,6 +205,12 @@ impl From<store::Error> for Error {
             }
             error => Self::Internal(format!("object store: {error}")),
         }
+    }
+}
+
+impl From<Refusal> for Error {
+    fn from(refusal: Refusal) -> Self {
+        Self::Unprocessable(refusal.to_string())
     }
 }
 

@@ -2,29 +2,60 @@
 
 use axum::{
     body::Bytes,
-    extract::{
-        FromRequest, FromRequestParts, Request,
-        path::ErrorKind,
-        rejection::{BytesRejection, PathRejection, QueryRejection},
-    },
-    http::{StatusCode, header},
+    extract::{FromRequest, FromRequestParts, RawPathParams, Request, rejection::BytesRejection},
+    http::{Method, StatusCode, header, request::Parts},
 };
 use serde::de::DeserializeOwned;
+use uuid::Uuid;
 
-use crate::{App, error::Error, idempotency::RequestKey};
+use crate::{App, error::Error, idempotency::RequestKey, json, query};
 
 /// Largest JSON body, bytes.
 pub(crate) const MAX_JSON_BYTES: usize = 256 << 10;
 
 /// Parts of the path.
-#[derive(Debug, FromRequestParts)]
-#[from_request(via(axum::extract::Path), rejection(Error))]
+#[derive(Debug)]
 pub(crate) struct Path<T>(pub T);
 
+impl<T: DeserializeOwned + Send> FromRequestParts<App> for Path<T> {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Error> {
+        check_path(parts, app).await?;
+        let path = axum::extract::Path::from_request_parts(parts, app).await;
+        let axum::extract::Path(found) =
+            path.map_err(|e| Error::Internal(format!("path: {}", e.body_text())))?;
+        Ok(Self(found))
+    }
+}
+
+/// Refuses a path whose parts can't name anything.
+async fn check_path(parts: &mut Parts, app: &App) -> Result<(), Error> {
+    let named = RawPathParams::from_request_parts(parts, app)
+        .await
+        .map_err(|_| Error::NoSuchPath(parts.uri.path().to_owned()))?;
+    for (key, value) in &named {
+        let is_no_id = key.ends_with("_id") && Uuid::try_parse(value).is_err();
+        // what an uploaded file may be called is said where it is received
+        let has_nul = value.contains('\0') && !(key == "name" && parts.method == Method::PUT);
+        if is_no_id || has_nul {
+            return Err(Error::not_found(named_by(key), value));
+        }
+    }
+    Ok(())
+}
+
 /// The query string.
-#[derive(Debug, FromRequestParts)]
-#[from_request(via(axum::extract::Query), rejection(Error))]
+#[derive(Debug)]
 pub(crate) struct Query<T>(pub T);
+
+impl<T: DeserializeOwned> FromRequestParts<App> for Query<T> {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, _: &App) -> Result<Self, Error> {
+        query::read(&parts.uri).map(Self)
+    }
+}
 
 /// The JSON body of a POST, and its idempotency key.
 #[derive(Debug)]
@@ -43,16 +74,13 @@ impl<T: DeserializeOwned> FromRequest<App> for Posted<T> {
         let path = request.uri().path().to_owned();
         let headers = request.headers().clone();
         let body = Bytes::from_request(request, app).await?;
-        let json = if body.is_empty() {
+        let text = if body.is_empty() {
             &b"{}"[..]
         } else {
             check_is_json(&headers)?;
             &body[..]
         };
-        let parsed = serde_json::from_slice(json).map_err(|error| match error.classify() {
-            serde_json::error::Category::Data => Error::Unprocessable(format!("body: {error}")),
-            _ => Error::BadRequest(format!("body is not JSON: {error}")),
-        })?;
+        let parsed = json::read(&json::parse(text)?)?;
         Ok(Self { body: parsed, request: RequestKey::read(&headers, &method, &path, &body)? })
     }
 }
@@ -67,36 +95,14 @@ fn check_is_json(headers: &axum::http::HeaderMap) -> Result<(), Error> {
     }
 }
 
-/// What the id in a path names.
+/// What a part of a path names.
 fn named_by(key: &str) -> &'static str {
     match key {
         "run_id" => "run",
         "session_id" => "session",
-        _ => "item",
-    }
-}
-
-impl From<PathRejection> for Error {
-    fn from(rejection: PathRejection) -> Self {
-        match rejection {
-            // an id that can't be one names nothing
-            PathRejection::FailedToDeserializePathParams(failed)
-                if failed.status() == StatusCode::BAD_REQUEST =>
-            {
-                let (what, which) = match failed.kind() {
-                    ErrorKind::ParseErrorAtKey { key, value, .. } => (named_by(key), value.clone()),
-                    other => ("path", other.to_string()),
-                };
-                Self::NotFound { what, which }
-            }
-            other => Self::Internal(format!("path: {}", other.body_text())),
-        }
-    }
-}
-
-impl From<QueryRejection> for Error {
-    fn from(rejection: QueryRejection) -> Self {
-        Self::BadRequest(rejection.body_text())
+        "motion_database" => "motion database",
+        "body_model" => "body model",
+        _ => "file",
     }
 }
 

@@ -87,7 +87,7 @@ fn the_kind_follows_from_the_files_when_it_is_left_out() -> Result<()> {
         (&none, json!({"motion_database": "walks"}), 404, "no motion database \"walks\""),
         (&none, json!({"kind": "multi-view"}), 422, "the session has no calibration"),
         (&none, json!({"kind": "inverse-kinematics"}), 422, "the session has no measured points"),
-        (&points, json!({}), 422, "missing field `motion_database`"),
+        (&points, json!({}), 422, "motion_database is missing: name the recordings"),
         (&points, json!({"motion_database": "walks"}), 404, "no motion database \"walks\""),
         (&points, json!({"kind": null, "motion_database": "walks"}), 404, "no motion database \"walks\""),
         (&points, json!({"cameras": ["cam1"]}), 422, "the session has control points, so kind is sparse"),
@@ -166,6 +166,100 @@ fn a_request_is_one_of_its_kinds_and_every_example_is_accepted_as_printed() -> R
         assert_eq!(status, 202, "{kind}: {word}");
         let (status, word) = ask(api, &empty, &example["value"])?;
         assert!(status == 422 && word.contains("upload a "), "{kind}: {status} {word}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_value_of_another_type_is_refused_with_the_name_of_its_field() -> Result<()> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    let session = api.session("s", &[POINTS, CALIBRATION, MASKS])?;
+    let sparse = |field: &str, value: Value| {
+        let mut request = json!({"kind": "sparse", "motion_database": "walks"});
+        request[field] = value;
+        request
+    };
+    let whole = "expected a whole number of 0 or more";
+    for (request, expected) in [
+        (sparse("motion_database", json!(5)), "motion_database is 5, expected text".to_owned()),
+        (sparse("window", json!(-1)), format!("window is -1, {whole}")),
+        (sparse("points", json!("head")), "points is \"head\", expected an array".to_owned()),
+        (sparse("points", json!(["head", 5])), "points[1] is 5, expected text".to_owned()),
+        (sparse("mapping", json!({"LWRA": 1})), "mapping.LWRA is 1, expected text".to_owned()),
+        (sparse("up", json!("w")), "up is \"w\", expected x".to_owned()),
+        (
+            sparse("parameters", json!({"neighbours": "abc"})),
+            format!("parameters.neighbours is \"abc\", {whole}"),
+        ),
+        (
+            json!({"kind": "multi-view", "camera_files": []}),
+            "camera_files is an array, expected an object".to_owned(),
+        ),
+        (
+            json!({"kind": "inverse-kinematics", "inverse_kinematics": []}),
+            "inverse_kinematics is an array, expected an object".to_owned(),
+        ),
+        (
+            json!({"kind": "inverse-kinematics", "inverse_kinematics": {"steps": "x"}}),
+            format!("inverse_kinematics.steps is \"x\", {whole}"),
+        ),
+    ] {
+        let (status, detail) = ask(&api, &session, &request)?;
+        assert_eq!(status, 422, "{request}: {detail}");
+        assert!(detail.starts_with(&expected), "{request}: {detail}");
+    }
+    let refused = api.get("/v1/sessions?limit=x")?;
+    let detail = refused.json()["detail"].clone();
+    assert_eq!((refused.status, detail), (400, json!(format!("limit is \"x\", {whole}"))));
+    Ok(())
+}
+
+#[test]
+fn no_text_of_a_request_has_a_nul_and_no_key_is_given_twice() -> Result<()> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    let session = api.session("s", &[POINTS, CALIBRATION, MASKS])?;
+    for (request, named) in [
+        (json!({"motion_database": "wa\u{0}lks"}), "motion_database has a NUL"),
+        (json!({"kind": "multi-view", "body_model": "a\u{0}"}), "body_model has a NUL"),
+        (json!({"motion_database": "walks", "points": ["head", "a\u{0}"]}), "points[1] has a NUL"),
+        (json!({"motion_database": "walks", "mapping": {"a": "\u{0}"}}), "mapping.a has a NUL"),
+        (json!({"motion_database": "walks", "mapping": {"a\u{0}": "head"}}), "mapping.a"),
+    ] {
+        let (status, detail) = ask(&api, &session, &request)?;
+        assert_eq!(status, 422, "{request}: {detail}");
+        assert!(detail.starts_with(named), "{request}: {detail}");
+    }
+    for path in ["/v1/motion-databases/%00", "/v1/body-models/a%00b", &format!("{session}/files/a%00.csv")] {
+        for answer in [api.get(path)?, api.delete(path)?] {
+            assert_eq!((answer.status, answer.problem().as_str()), (404, "not-found"), "{path}");
+        }
+    }
+    assert_eq!(api.put(&format!("{session}/files/a%00.csv"), b"x")?.status, 422);
+
+    let body = br#"{"kind": "sparse", "motion_database": "a", "motion_database": "b"}"#;
+    let twice = api.post_raw(&format!("{session}/runs"), body, "application/json")?;
+    let detail = twice.json()["detail"].clone();
+    assert_eq!((twice.status, detail), (422, json!("motion_database is given twice, expected once")));
+    Ok(())
+}
+
+#[test]
+fn an_id_that_is_none_names_nothing() -> Result<()> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    for (answer, what) in [
+        (api.post("/v1/sessions/abc/runs", &json!({}))?, "session"),
+        (api.get("/v1/sessions/abc/files/points.csv")?, "session"),
+        (api.get("/v1/runs/abc")?, "run"),
+        (api.get("/v1/runs/abc/results/motion.bvh")?, "run"),
+    ] {
+        let detail = answer.json()["detail"].clone();
+        assert_eq!(
+            (answer.status, detail),
+            (404, json!(format!("there is no {what} \"abc\" in this project")))
+        );
     }
     Ok(())
 }

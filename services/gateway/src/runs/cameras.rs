@@ -15,6 +15,7 @@ use uuid::Uuid;
 use super::{session_run::OnSession, units::check_unit};
 use crate::{
     error::{Error, Result},
+    json,
     lock::Lock,
     versioned::{self, BodyModel, Latest},
 };
@@ -70,8 +71,7 @@ impl CameraFields {
     /// All parameters, those left out with their defaults.
     fn resolve(&self) -> Result<Parameters> {
         let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
-        let given = Value::Object(self.parameters.clone());
-        let mut parameters: Parameters = serde_json::from_value(given).map_err(|error| refuse(&error))?;
+        let mut parameters: Parameters = json::read_parameters(self.parameters.clone())?;
         if let Some(kind) = &self.background {
             parameters.background.model = serde_json::from_value(kind.as_str().into()).map_err(|_| {
                 Error::Unprocessable(format!(

@@ -15,7 +15,7 @@ use super::{
     cameras::{self, CameraFields},
     enqueue::NewRun,
     markers::MarkerFields,
-    session_run::{OnSession, SessionRun},
+    session_run::{OnSession, SessionRun, Shared, shared},
 };
 use crate::{
     error::{Error, Result},
@@ -85,6 +85,7 @@ pub(super) struct InverseKinematicsRequest {
 impl SessionRun for InverseKinematicsRun {
     const KIND: &'static str = RUN_KIND;
     const IMPLIED_BY: Option<&'static str> = Some("inverse_kinematics");
+    const SHARED: &'static [Shared] = &[shared::<MarkerFields>, shared::<CameraFields>];
 
     fn example() -> Value {
         json!({

@@ -11,7 +11,7 @@ use uuid::Uuid;
 use super::{
     cameras::{self, CameraFields},
     enqueue::NewRun,
-    session_run::{OnSession, SessionRun},
+    session_run::{OnSession, SessionRun, Shared, shared},
 };
 use crate::{error::Result, page::Item};
 
@@ -34,6 +34,7 @@ pub(super) struct MultiViewRun {
 impl SessionRun for MultiViewRun {
     const KIND: &'static str = multi_view::RUN_KIND;
     const FILES: Option<(FileRole, &'static str)> = Some((FileRole::Calibration, "a calibration"));
+    const SHARED: &'static [Shared] = &[shared::<CameraFields>];
 
     fn example() -> Value {
         json!({

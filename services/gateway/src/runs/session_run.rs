@@ -21,6 +21,8 @@ use uuid::Uuid;
 use super::enqueue::NewRun;
 use crate::{
     error::{Error, Result},
+    json,
+    refusal::Refusal,
     sessions::Session,
 };
 
@@ -55,6 +57,13 @@ pub(super) trait SessionRun: DeserializeOwned + ToSchema + Send + 'static {
 
     /// The field that makes it the kind where none is named.
     const IMPLIED_BY: Option<&'static str> = None;
+
+    /// The fields that it shares with other kinds: what is wrong with them is found out by themselves, as what a request
+    /// is composed of is read without a trace of where.
+    const SHARED: &'static [Shared] = &[];
+
+    /// A field that is required, and what is said to whoever left it out.
+    const REQUIRED: Option<(&'static str, &'static str)> = None;
 
     /// A request as people may send it.
     fn example() -> Value;
@@ -151,10 +160,24 @@ impl Kind {
 }
 
 fn read<R: SessionRun>(fields: Map<String, Value>) -> Result<Box<dyn Asked>> {
-    let asked: R = serde_json::from_value(Value::Object(fields))
-        .map_err(|error| Error::Unprocessable(format!("request of kind {}: {error}", R::KIND)))?;
+    let fields = Value::Object(fields);
+    R::SHARED.iter().try_for_each(|check| check(&fields))?;
+    let asked: R = json::read(&fields).map_err(|refusal| match R::REQUIRED {
+        Some((field, what_to_do)) if refusal.lacks(field) => {
+            Error::Unprocessable(format!("{field} is missing: {what_to_do}"))
+        }
+        _ => refusal.into(),
+    })?;
     asked.check()?;
     Ok(Box::new(asked))
+}
+
+/// Refuses fields that are not of their types.
+pub(super) type Shared = fn(&Value) -> Result<(), Refusal>;
+
+/// [`Shared`] for the fields of `F`, which overlooks all others.
+pub(super) fn shared<F: DeserializeOwned>(fields: &Value) -> Result<(), Refusal> {
+    json::read::<F>(fields).map(drop)
 }
 
 fn object<R: SessionRun>() -> Object {

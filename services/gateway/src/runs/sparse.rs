@@ -7,7 +7,7 @@ use jobs::{
     sparse::{self, PlanSparse},
 };
 use serde::Deserialize;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 use sqlx::PgConnection;
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -15,11 +15,12 @@ use uuid::Uuid;
 use super::{
     enqueue::NewRun,
     markers::MarkerFields,
-    session_run::{OnSession, SessionRun},
+    session_run::{OnSession, SessionRun, Shared, shared},
     units::check_unit,
 };
 use crate::{
     error::{Error, Result},
+    json,
     lock::Lock,
     page::Item,
     versioned::{self, Latest, MotionDatabase},
@@ -60,9 +61,12 @@ pub(super) struct SparseRun {
 impl SessionRun for SparseRun {
     const KIND: &'static str = "sparse";
     const FILES: Option<(FileRole, &'static str)> = Some((FileRole::ControlPoints, "control points"));
+    const SHARED: &'static [Shared] = &[shared::<MarkerFields>];
+    const REQUIRED: Option<(&'static str, &'static str)> =
+        Some(("motion_database", "name the recordings to learn from (--database NAME in `marey run`)"));
 
     fn example() -> Value {
-        json!({
+        serde_json::json!({
             "kind": "sparse",
             "motion_database": "walks",
             "points": ["left_wrist", "right_wrist", "left_ankle", "right_ankle"],
@@ -144,8 +148,7 @@ pub(crate) fn resolve_parameters(
             given.entry(name).or_insert(Value::from(0.0));
         }
     }
-    let parameters: Parameters =
-        serde_json::from_value(Value::Object(given)).map_err(|error| refuse(&error))?;
+    let parameters: Parameters = json::read_parameters(given)?;
     parameters.check().map_err(|error| refuse(&error))?;
     Ok(parameters)
 }

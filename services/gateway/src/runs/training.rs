@@ -12,6 +12,7 @@ use crate::{
     answer::Answer,
     error::{Error, Result},
     extract::Posted,
+    json,
     lock::Lock,
     page::Item,
     versioned::{self, Latest, MotionDatabase},
@@ -39,8 +40,7 @@ impl NewTraining {
                 "method is {method:?}, expected \"gplvm\": no other method needs a model"
             )));
         }
-        let given = Value::Object(self.parameters.clone());
-        let options: TrainingOptions = serde_json::from_value(given).map_err(|error| refuse(&error))?;
+        let options: TrainingOptions = json::read_parameters(self.parameters.clone())?;
         options.check().map_err(|error| refuse(&error))?;
         Ok(options)
     }
