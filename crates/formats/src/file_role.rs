@@ -131,6 +131,21 @@ impl FileRole {
         endings(&extensions)
     }
 
+    /// What is made from files of this role, where they are not a session's.
+    pub fn elsewhere(self) -> Option<&'static str> {
+        match self {
+            Self::Motion => Some("motion databases"),
+            Self::Scans => Some("body models"),
+            _ => None,
+        }
+    }
+
+    /// The endings of all files that a session can have, by role: `skeleton .asf or .bvh; …`.
+    pub fn session_endings() -> String {
+        let roles = Self::ALL.into_iter().filter(|role| role.elsewhere().is_none());
+        roles.map(|role| format!("{role} {}", role.endings())).collect::<Vec<_>>().join("; ")
+    }
+
     /// Whether a file of that name is a picture, not compressed once more.
     pub fn is_picture_file(name: &str) -> bool {
         without_compression(name) == name && PICTURE.contains(&extension(name).as_str())
@@ -216,6 +231,20 @@ mod tests {
         assert!(FileRole::is_motion_file("all.tgz"));
         assert!(!FileRole::is_motion_file("scan.obj"));
         assert!(!FileRole::is_motion_file("points.csv"));
+    }
+
+    #[test]
+    fn a_name_tells_no_role_only_where_no_role_fits() {
+        for name in ["points.txt", "scan.obj", "notes", ".csv"] {
+            assert_eq!(FileRole::from_session_file(name), None, "{name}");
+            assert!(!FileRole::ALL.into_iter().any(|role| role.fits_session_file(name)), "{name}");
+        }
+        let said = FileRole::session_endings();
+        assert!(
+            said.starts_with("skeleton .") && said.contains("; control-points .csv, .trc or .c3d; "),
+            "{said}"
+        );
+        assert!(!said.contains("motion .") && !said.contains("scans ."), "{said}");
     }
 
     #[test]

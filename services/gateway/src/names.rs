@@ -2,15 +2,15 @@
 
 use crate::error::{Error, Result};
 
-/// Longest name of a session or file, characters.
+/// Longest name of a session or file, and longest tag, characters.
 const MAX_NAME_CHARS: usize = 200;
 
-/// Checks the name of a session: any text of one line.
-pub(crate) fn check_session_name(name: &str) -> Result<()> {
-    let length = name.chars().count();
-    if length == 0 || length > MAX_NAME_CHARS || name.chars().any(char::is_control) {
+/// Checks the name of a session, or a tag: any text of one line.
+pub(crate) fn check_line(field: &str, text: &str) -> Result<()> {
+    let length = text.chars().count();
+    if length == 0 || length > MAX_NAME_CHARS || text.chars().any(char::is_control) {
         return Err(Error::Unprocessable(format!(
-            "name has {length} characters, expected 1 to {MAX_NAME_CHARS} without control characters"
+            "{field} has {length} characters, expected 1 to {MAX_NAME_CHARS} without control characters"
         )));
     }
     Ok(())

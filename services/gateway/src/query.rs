@@ -1,6 +1,13 @@
 //! Query strings: every parameter once, and refused by its name.
 
-use axum::{extract::Query, http::Uri};
+use std::{collections::HashMap, sync::Arc};
+
+use axum::{
+    extract::{MatchedPath, Query, Request, State},
+    http::{Method, Uri},
+    middleware::Next,
+    response::Response,
+};
 use serde::{
     Deserializer,
     de::{
@@ -9,6 +16,7 @@ use serde::{
     },
     forward_to_deserialize_any,
 };
+use utoipa::openapi::{OpenApi, path::ParameterIn};
 
 use crate::{
     error::{Error, Result},
@@ -33,6 +41,68 @@ pub(crate) fn read<T: DeserializeOwned>(uri: &Uri) -> Result<T> {
     }
     T::deserialize(Pairs { rest: &pairs, last: None })
         .map_err(|refusal| Error::BadRequest(refusal.to_string()))
+}
+
+/// The query parameters of every method and path of the API, as it describes itself.
+#[derive(Debug)]
+pub(crate) struct Known(HashMap<(Method, String), Vec<String>>);
+
+impl Known {
+    /// Those that are described.
+    pub fn of(api: &OpenApi) -> Self {
+        let mut known = HashMap::new();
+        for (path, item) in &api.paths.paths {
+            let operations = [
+                (Method::GET, &item.get),
+                (Method::PUT, &item.put),
+                (Method::POST, &item.post),
+                (Method::DELETE, &item.delete),
+            ];
+            for (method, operation) in operations {
+                let Some(operation) = operation else { continue };
+                let parameters = operation.parameters.iter().flatten();
+                let queries = parameters.filter(|one| one.parameter_in == ParameterIn::Query);
+                let names: Vec<String> = queries.map(|one| one.name.clone()).collect();
+                if method == Method::GET {
+                    known.insert((Method::HEAD, path.clone()), names.clone());
+                }
+                known.insert((method, path.clone()), names);
+            }
+        }
+        Self(known)
+    }
+
+    /// Refuses a parameter that the path doesn't have. Probes may ask as they like.
+    fn check(&self, request: &Request) -> Result<()> {
+        let Some(path) = request.extensions().get::<MatchedPath>() else { return Ok(()) };
+        if request.uri().query().is_none() || !path.as_str().starts_with("/v1/") {
+            return Ok(());
+        }
+        let key = (request.method().clone(), path.as_str().to_owned());
+        let Some(known) = self.0.get(&key) else { return Ok(()) };
+        match pairs(request.uri())?.iter().find(|(name, _)| !known.contains(name)) {
+            None => Ok(()),
+            Some((name, _)) if known.is_empty() => Err(Error::BadRequest(format!(
+                "{} is not known; there are no query parameters here",
+                quoted(name)
+            ))),
+            Some((name, _)) => Err(Error::BadRequest(format!(
+                "{} is not known; there are: {}",
+                quoted(name),
+                known.join(", ")
+            ))),
+        }
+    }
+}
+
+/// Refuses query parameters that the path doesn't have, whatever its handler looks at.
+pub(crate) async fn refuse_unknown(
+    State(known): State<Arc<Known>>,
+    request: Request,
+    next: Next,
+) -> Result<Response> {
+    known.check(&request)?;
+    Ok(next.run(request).await)
 }
 
 /// All parameters.

@@ -27,7 +27,13 @@ use tower_http::{catch_panic::CatchPanicLayer, trace::TraceLayer};
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::SwaggerUi;
 
-use crate::{App, error::Error, extract::MAX_JSON_BYTES, observe, openapi};
+use crate::{
+    App,
+    error::Error,
+    extract::MAX_JSON_BYTES,
+    observe, openapi,
+    query::{self, Known},
+};
 
 /// Every route of the API, with its description.
 fn described() -> OpenApiRouter<App> {
@@ -72,7 +78,9 @@ pub fn openapi_document() -> utoipa::openapi::OpenApi {
 /// The whole service: API, its description, and what surrounds every request.
 pub fn router(app: App) -> Router {
     let (router, api) = described().split_for_parts();
+    let known = Arc::new(Known::of(&api));
     router
+        .layer(middleware::from_fn_with_state(known, query::refuse_unknown))
         .merge(SwaggerUi::new("/docs").url("/openapi.json", openapi::finish(api)))
         // whoever opens the address alone finds the page
         .route("/", get(|| async { Redirect::temporary("/docs/") }))

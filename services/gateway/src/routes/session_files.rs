@@ -72,9 +72,17 @@ pub(super) async fn put(
     body: Body,
 ) -> Result<(StatusCode, Json<File>)> {
     names::check_file_name(&name)?;
+    if let Some((role, made)) = query.role.and_then(|role| Some((role, role.elsewhere()?))) {
+        return Err(Error::Unprocessable(format!(
+            "role {role} is for files that {made} are built from, not for those of a session: upload {name:?} to one of \
+             the {made}"
+        )));
+    }
+    // a role that is stated would not help: no role has files of that ending
     let role = query.role.or_else(|| FileRole::from_session_file(&name)).ok_or_else(|| {
         Error::Unprocessable(format!(
-            "the role of {name:?} can't be told from its name; state it: --role in `marey upload`, ?role= in a request"
+            "{name:?} ends like no file of a session, expected one of: {}",
+            FileRole::session_endings()
         ))
     })?;
     if !role.fits_session_file(&name) {

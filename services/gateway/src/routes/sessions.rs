@@ -27,6 +27,7 @@ pub(crate) struct NewSession {
     name: String,
     /// words to find it by; at most 32
     #[serde(default)]
+    #[schema(value_type = Option<Vec<String>>)]
     tags: Vec<String>,
 }
 
@@ -40,14 +41,16 @@ pub(super) async fn create(
     Writer(Access { app, caller }): Writer,
     Posted { body, request }: Posted<NewSession>,
 ) -> Result<Answer> {
-    names::check_session_name(&body.name)?;
+    names::check_line("name", &body.name)?;
     if body.tags.len() > MAX_TAGS {
         return Err(Error::Unprocessable(format!(
             "there are {} tags, expected at most {MAX_TAGS}",
             body.tags.len()
         )));
     }
-    body.tags.iter().try_for_each(|tag| names::check_session_name(tag))?;
+    for (number, tag) in body.tags.iter().enumerate() {
+        names::check_line(&format!("tags[{number}]"), tag)?;
+    }
     let mut tx = app.db.begin().await?;
     if let Some(answer) = request.replay(&mut tx, caller.project_id).await? {
         return Ok(answer);

@@ -24,6 +24,11 @@ use crate::{
 
 /// Most steps of one solve, and those when left out.
 const STEPS: (usize, usize) = (200, 15);
+/// What people measure, as bodies of a model are looked for: field, least and most.
+const MEASUREMENTS: [(&str, f64, f64); 3] =
+    [("stature_m", 1.0, 2.4), ("mass_kg", 20.0, 250.0), ("age_years", 0.0, 120.0)];
+/// Most standard deviations that a coefficient is from the mean.
+const MOST_DEVIATIONS: f64 = 6.0;
 /// Frames a second.
 const FRAME_RATES: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
@@ -79,6 +84,7 @@ pub(super) struct InverseKinematicsRequest {
     sex: Option<String>,
     /// coefficients of the body model, standard deviations, as in `shape.json`; instead of measurements
     #[serde(default)]
+    #[schema(value_type = Option<Vec<f64>>)]
     alpha: Vec<f64>,
 }
 
@@ -154,7 +160,35 @@ impl InverseKinematicsRequest {
         if let Some(rate) = self.frame_rate.filter(|rate| !FRAME_RATES.contains(rate)) {
             return refuse(format!("frame_rate is {rate}, expected 1 to 1000"));
         }
-        self.sex().map(drop)
+        self.check_body()
+    }
+
+    /// Refuses a body that nobody has, and one that is described in two ways.
+    fn check_body(&self) -> Result<()> {
+        let refuse = |what: String| Err(Error::Unprocessable(what));
+        let sex = self.sex()?;
+        let measured = [self.stature_m, self.mass_kg, self.age_years];
+        for ((field, least, most), value) in MEASUREMENTS.into_iter().zip(measured) {
+            if let Some(value) = value.filter(|value| !(least..=most).contains(value)) {
+                return refuse(format!("{field} is {value}, expected {least} to {most}"));
+            }
+        }
+        if self.alpha.is_empty() {
+            return Ok(());
+        }
+        if sex.is_some() || measured.iter().any(Option::is_some) {
+            return refuse("alpha is given beside measurements, expected one of the two".into());
+        }
+        if self.alpha.len() > body::MAX_COMPONENTS {
+            let (found, most) = (self.alpha.len(), body::MAX_COMPONENTS);
+            return refuse(format!("alpha has {found} numbers, expected at most {most}"));
+        }
+        match self.alpha.iter().enumerate().find(|(_, a)| a.abs() > MOST_DEVIATIONS) {
+            None => Ok(()),
+            Some((number, a)) => refuse(format!(
+                "alpha[{number}] is {a}, expected -{MOST_DEVIATIONS} to {MOST_DEVIATIONS} standard deviations"
+            )),
+        }
     }
 
     fn sex(&self) -> Result<Option<Sex>> {

@@ -12,7 +12,7 @@ use sqlx::PgConnection;
 use utoipa::{
     ToSchema,
     openapi::{
-        AllOfBuilder, Object, ObjectBuilder, RefOr, Schema,
+        AllOfBuilder, Object, ObjectBuilder, OneOfBuilder, RefOr, Schema,
         schema::{AdditionalProperties, AnyOfBuilder, SchemaType, Type},
     },
 };
@@ -58,8 +58,8 @@ pub(super) trait SessionRun: DeserializeOwned + ToSchema + Send + 'static {
     /// The field that makes it the kind where none is named.
     const IMPLIED_BY: Option<&'static str> = None;
 
-    /// The fields that it shares with other kinds: what is wrong with them is found out by themselves, as what a request
-    /// is composed of is read without a trace of where.
+    /// The fields that it shares with other kinds. They are checked by themselves, as what a request is composed of is
+    /// read without a trace of where.
     const SHARED: &'static [Shared] = &[];
 
     /// A field that is required, and what is said to whoever left it out.
@@ -149,7 +149,12 @@ impl Kind {
     pub fn schema(&self) -> Schema {
         let object = (self.object)();
         let Some(field) = self.implied_by else { return object.into() };
-        let has = |name: &str| ObjectBuilder::new().required(name);
+        let values = [Type::Object, Type::Array, Type::String, Type::Number, Type::Boolean];
+        // one that is null is left out
+        let has = |name: &str| {
+            let given = ObjectBuilder::new().schema_type(SchemaType::from_iter(values.clone()));
+            ObjectBuilder::new().property(name, given).required(name)
+        };
         AllOfBuilder::new()
             .description(object.description.clone())
             .examples(object.examples.clone())
@@ -187,9 +192,42 @@ fn object<R: SessionRun>() -> Object {
         .enum_values(Some([R::KIND]))
         .description(Some("what kind of run it is; what the session's files are for when left out"));
     object.properties.insert("kind".to_owned(), RefOr::T(kind.into()));
+    let required = &object.required;
+    for (_, schema) in object.properties.iter_mut().filter(|(name, _)| !required.contains(name)) {
+        let described = std::mem::replace(schema, RefOr::T(Object::new().into()));
+        *schema = or_null(described);
+    }
     object.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));
     object.examples = vec![R::example()];
     object
+}
+
+/// A field that may be left out, which null stands for.
+fn or_null(schema: RefOr<Schema>) -> RefOr<Schema> {
+    let with_null = |types: &SchemaType| match types {
+        SchemaType::Type(one) if *one != Type::Null => SchemaType::from_iter([one.clone(), Type::Null]),
+        SchemaType::Array(several) if !several.contains(&Type::Null) => {
+            SchemaType::from_iter(several.iter().cloned().chain([Type::Null]))
+        }
+        other => other.clone(),
+    };
+    match schema {
+        RefOr::T(Schema::Object(mut object)) => {
+            object.schema_type = with_null(&object.schema_type);
+            if let Some(words) = object.enum_values.as_mut().filter(|words| !words.contains(&Value::Null)) {
+                words.push(Value::Null);
+            }
+            RefOr::T(object.into())
+        }
+        RefOr::T(Schema::Array(mut array)) => {
+            array.schema_type = with_null(&array.schema_type);
+            RefOr::T(array.into())
+        }
+        other => {
+            let null = ObjectBuilder::new().schema_type(Type::Null);
+            RefOr::T(OneOfBuilder::new().item(null).item(other).into())
+        }
+    }
 }
 
 /// One object with the fields of all objects that a request is composed of.

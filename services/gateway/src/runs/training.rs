@@ -27,7 +27,7 @@ pub(crate) struct NewTraining {
     method: Option<String>,
     /// how it is trained, by name: `latent_dims`, `active`, `max_iterations`
     #[serde(default)]
-    #[schema(example = json!({"latent_dims": 4}))]
+    #[schema(value_type = Option<Object>, example = json!({"latent_dims": 4}))]
     parameters: Map<String, Value>,
 }
 

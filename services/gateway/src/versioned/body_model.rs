@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{
-    noun::{Noun, State, Version, Versioned},
+    noun::{Added, Noun, State, Version, Versioned},
     sql::sql,
     users::runs_that_use,
 };
@@ -113,16 +113,19 @@ impl Versioned for BodyModel {
         Ok(&new.name)
     }
 
-    async fn insert(db: &mut PgConnection, project_id: Uuid, id: Uuid, new: &NewBodyModel) -> Result<()> {
-        sqlx::query(
-            "INSERT INTO body_models (id, project_id, name, version)
-             SELECT $1, $2, $3, coalesce(max(version), 0) + 1 FROM body_models WHERE project_id = $2 AND name = $3",
-        )
-        .bind(id)
-        .bind(project_id)
-        .bind(&new.name)
-        .execute(db)
-        .await?;
+    async fn insert(
+        db: &mut PgConnection,
+        project_id: Uuid,
+        Added { id, version }: Added,
+        new: &NewBodyModel,
+    ) -> Result<()> {
+        sqlx::query("INSERT INTO body_models (id, project_id, name, version) VALUES ($1, $2, $3, $4)")
+            .bind(id)
+            .bind(project_id)
+            .bind(&new.name)
+            .bind(version)
+            .execute(db)
+            .await?;
         Ok(())
     }
 }

@@ -2,11 +2,12 @@
 
 use axum::{Json, http::StatusCode};
 use queue::RunId;
+use sqlx::PgConnection;
 use uuid::Uuid;
 
 use super::{
     lookup::{Latest, find},
-    noun::Versioned,
+    noun::{Added, Versioned},
     users,
 };
 use crate::{
@@ -42,10 +43,24 @@ pub(crate) async fn create<V: Versioned>(by: &Access, posted: Posted<V::New>) ->
         .execute(&mut *tx)
         .await?;
     let id = Uuid::now_v7();
-    V::insert(&mut tx, project_id, id, &body).await?;
+    let version = next_version::<V>(&mut tx, project_id, name).await?;
+    V::insert(&mut tx, project_id, Added { id, version }, &body).await?;
     let made: V = find(&mut tx, project_id, &id.to_string(), Latest::Any, Lock::None).await?;
     let answer = Answer::created(format!("{}/{id}", V::NOUN.path), &made)?;
     request.commit(tx, project_id, answer).await
+}
+
+/// The number of a name's next version. That of a version that was deleted is not used again.
+async fn next_version<V: Versioned>(db: &mut PgConnection, project_id: Uuid, name: &str) -> Result<i32> {
+    let last: Option<i32> = sqlx::query_scalar(
+        "SELECT version FROM last_versions WHERE project_id = $1 AND noun = $2 AND name = $3",
+    )
+    .bind(project_id)
+    .bind(V::NOUN.sql.table)
+    .bind(name)
+    .fetch_optional(db)
+    .await?;
+    Ok(last.unwrap_or(0) + 1)
 }
 
 /// All versions of all names, newest first; the last is the one that comes with the program, if there is one.

@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use super::{
     lookup::{Latest, find},
-    noun::{Noun, Version, Versioned},
+    noun::{Added, Noun, Version, Versioned},
     sql::sql,
     users::runs_that_use,
 };
@@ -76,7 +76,7 @@ pub(crate) struct NewMotionDatabase {
     base: Option<String>,
     /// clips of `base` to be left out, with all that was made from them
     #[serde(default)]
-    #[schema(example = json!(["16_15"]))]
+    #[schema(value_type = Option<Vec<String>>, example = json!(["16_15"]))]
     without: Vec<String>,
 }
 
@@ -129,7 +129,7 @@ impl Versioned for MotionDatabase {
     async fn insert(
         db: &mut PgConnection,
         project_id: Uuid,
-        id: Uuid,
+        Added { id, version }: Added,
         new: &NewMotionDatabase,
     ) -> Result<()> {
         let base = match &new.base {
@@ -143,12 +143,12 @@ impl Versioned for MotionDatabase {
         };
         sqlx::query(
             "INSERT INTO motion_databases (id, project_id, name, version, base_id, without)
-             SELECT $1, $2, $3, coalesce(max(version), 0) + 1, $4, $5
-             FROM motion_databases WHERE project_id = $2 AND name = $3",
+             VALUES ($1, $2, $3, $4, $5, $6)",
         )
         .bind(id)
         .bind(project_id)
         .bind(&new.name)
+        .bind(version)
         .bind(base)
         .bind(&new.without)
         .execute(db)

@@ -121,6 +121,13 @@ impl fmt::Display for Version {
     }
 }
 
+/// A version that is being made.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Added {
+    pub id: Uuid,
+    pub version: i32,
+}
+
 /// A row of a table of versioned things.
 pub(crate) trait Versioned: Item + Serialize + Sync + 'static {
     /// What it is.
@@ -140,11 +147,11 @@ pub(crate) trait Versioned: Item + Serialize + Sync + 'static {
     /// The name that a request asks for; refuses a request that makes no sense, whatever there is already.
     fn check(new: &Self::New) -> Result<&str>;
 
-    /// Adds the row of that id, the next version of its name.
+    /// Adds the row of that id, that version of its name.
     fn insert(
         db: &mut PgConnection,
         project_id: Uuid,
-        id: Uuid,
+        added: Added,
         new: &Self::New,
     ) -> impl Future<Output = Result<()>> + Send;
 
