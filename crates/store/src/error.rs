@@ -94,6 +94,12 @@ impl Error {
         matches!(self, Self::Backend { .. } | Self::Interrupted { .. })
     }
 
+    /// Trouble with the store's folder itself.
+    pub(crate) fn from_io(error: std::io::Error) -> Self {
+        let source = object_store::Error::Generic { store: "folder", source: Box::new(error) };
+        Self::Backend { key: "its folder".to_owned(), source }
+    }
+
     pub(crate) fn at(key: &Key) -> impl Fn(object_store::Error) -> Self + Send + use<> {
         let key = key.clone();
         move |source| match source {

@@ -15,6 +15,7 @@
 //! assert_eq!(store.get_checked(&key, &stored.blake3, 1024).await.unwrap(), "bytes of an index");
 //! # });
 //! ```
+mod abandoned;
 mod error;
 pub mod key;
 mod location;

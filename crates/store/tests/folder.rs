@@ -179,3 +179,45 @@ async fn what_earlier_attempts_left_is_removed_and_nothing_else() {
         .map(|f| f.split('/').skip(2).take(2).collect::<Vec<_>>().join("/"));
     assert_eq!(left.collect::<Vec<_>>(), ["7/10", "70/1", "8/1"]);
 }
+
+#[tokio::test]
+async fn what_a_killed_process_left_of_a_write_is_removed_when_it_is_old() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = open(folder.path());
+    store.put(&key("runs/1/whole"), Bytes::from_static(b"x")).await.unwrap();
+    let left = folder.path().join("runs/1/points.csv#1");
+    std::fs::write(&left, b"half").unwrap();
+    let other = folder.path().join("runs/1/notes#old");
+    std::fs::write(&other, b"not ours").unwrap();
+
+    let day = std::time::Duration::from_secs(24 * 3600);
+    assert_eq!(store.remove_abandoned_uploads(day).await.unwrap(), 0, "it may still be written to");
+    let written = std::time::SystemTime::now() - day;
+    for file in [&left, &other, &folder.path().join("runs/1/whole")] {
+        std::fs::File::options().append(true).open(file).unwrap().set_modified(written).unwrap();
+    }
+    assert_eq!(store.remove_abandoned_uploads(day).await.unwrap(), 1);
+    assert_eq!(files_in(folder.path()), ["runs/1/notes#old", "runs/1/whole"]);
+}
+
+#[tokio::test]
+async fn a_write_in_progress_is_named_as_the_removal_of_old_ones_expects() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = open(folder.path());
+    let endless = stream::iter([Ok::<_, String>(Bytes::from_static(b"first"))]).chain(stream::pending());
+    let task = {
+        let store = store.clone();
+        tokio::spawn(async move { store.put_stream(&key("runs/1/a"), endless, &up_to(100)).await })
+    };
+    let mut found = Vec::new();
+    for _ in 0..500 {
+        found = files_in(folder.path());
+        if !found.is_empty() {
+            break;
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+    }
+    assert!(found.len() == 1 && found[0].starts_with("runs/1/a#"), "{found:?}");
+    assert_eq!(store.remove_abandoned_uploads(std::time::Duration::ZERO).await.unwrap(), 1);
+    task.abort();
+}

@@ -10,7 +10,11 @@ use crate::{App, error::Result};
 /// How often, seconds.
 const INTERVAL: Duration = Duration::from_secs(3600);
 
-/// Forgets idempotency keys after a day, and removes what jobs of ended builds left for each other, until `shutdown`.
+/// An unfinished upload that nothing was added to for so long is not going on any more.
+const ABANDONED: Duration = Duration::from_secs(24 * 3600);
+
+/// Forgets idempotency keys after a day, and removes what jobs of ended builds left for each other and what uploads left
+/// that a killed process never finished, until `shutdown`.
 pub(crate) async fn run(app: App, shutdown: CancellationToken) {
     loop {
         let forgotten =
@@ -24,6 +28,11 @@ pub(crate) async fn run(app: App, shutdown: CancellationToken) {
         match remove_parts(&app).await {
             Ok(removed) => tracing::debug!(removed, "removed parts of motion databases"),
             Err(error) => tracing::warn!(%error, "could not remove parts of motion databases"),
+        }
+        match app.store.remove_abandoned_uploads(ABANDONED).await {
+            Ok(0) => {}
+            Ok(removed) => tracing::info!(removed, "removed what was left of unfinished uploads"),
+            Err(error) => tracing::warn!(%error, "could not remove what was left of unfinished uploads"),
         }
         tokio::select! {
             () = tokio::time::sleep(INTERVAL) => {}

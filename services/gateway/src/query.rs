@@ -16,7 +16,10 @@ use serde::{
     },
     forward_to_deserialize_any,
 };
-use utoipa::openapi::{OpenApi, path::ParameterIn};
+use utoipa::openapi::{
+    OpenApi, RefOr,
+    path::{Operation, ParameterIn},
+};
 
 use crate::{
     error::{Error, Result},
@@ -48,8 +51,8 @@ pub(crate) fn read<T: DeserializeOwned>(uri: &Uri) -> Result<T> {
 pub(crate) struct Known(HashMap<(Method, String), Vec<String>>);
 
 impl Known {
-    /// Those that are described.
-    pub fn of(api: &OpenApi) -> Self {
+    /// Those that the description has.
+    pub fn from_description(api: &OpenApi) -> Self {
         let mut known = HashMap::new();
         for (path, item) in &api.paths.paths {
             let operations = [
@@ -60,9 +63,7 @@ impl Known {
             ];
             for (method, operation) in operations {
                 let Some(operation) = operation else { continue };
-                let parameters = operation.parameters.iter().flatten();
-                let queries = parameters.filter(|one| one.parameter_in == ParameterIn::Query);
-                let names: Vec<String> = queries.map(|one| one.name.clone()).collect();
+                let names = query_parameters(operation);
                 if method == Method::GET {
                     known.insert((Method::HEAD, path.clone()), names.clone());
                 }
@@ -93,6 +94,14 @@ impl Known {
             ))),
         }
     }
+}
+
+fn query_parameters(operation: &Operation) -> Vec<String> {
+    let parameters = operation.parameters.iter().flatten().filter_map(|one| match one {
+        RefOr::T(parameter) if parameter.parameter_in == ParameterIn::Query => Some(parameter.name.clone()),
+        _ => None,
+    });
+    parameters.collect()
 }
 
 /// Refuses query parameters that the path doesn't have, whatever its handler looks at.

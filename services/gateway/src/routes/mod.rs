@@ -78,7 +78,7 @@ pub fn openapi_document() -> utoipa::openapi::OpenApi {
 /// The whole service: API, its description, and what surrounds every request.
 pub fn router(app: App) -> Router {
     let (router, api) = described().split_for_parts();
-    let known = Arc::new(Known::of(&api));
+    let known = Arc::new(Known::from_description(&api));
     router
         .layer(middleware::from_fn_with_state(known, query::refuse_unknown))
         .merge(SwaggerUi::new("/docs").url("/openapi.json", openapi::finish(api)))
