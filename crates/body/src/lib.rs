@@ -71,7 +71,7 @@ pub use shipped::{Shipped, shipped};
 pub use skin::Skin;
 pub use subject::{Sex, Subject, UnknownSex};
 pub use template::{KnownJoints, Template, TemplateParts};
-pub use wanted::Wanted;
+pub use wanted::{MAX_DEVIATIONS, Wanted};
 
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -20,6 +20,30 @@ pub struct Wanted {
     pub age_years: Option<f64>,
 }
 
+impl Wanted {
+    /// Refuses measurements that nobody has.
+    ///
+    /// # Errors
+    /// [`Error::Wanted`].
+    pub fn check(&self) -> Result<()> {
+        let ranges = [
+            ("stature", self.stature_m, 1.0, 2.4, "m"),
+            ("mass", self.mass_kg, 20.0, 250.0, "kg"),
+            ("age", self.age_years, 0.0, 120.0, "years"),
+        ];
+        for (name, value, low, high, unit) in ranges {
+            if let Some(value) = value.filter(|value| !(low..=high).contains(value)) {
+                let what = format!("{name} of {value} {unit} was asked for, expected {low} to {high}");
+                return Err(Error::Wanted { what });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Most standard deviations of a coefficient from the mean.
+pub const MAX_DEVIATIONS: f64 = 6.0;
+
 const STATURE: usize = 0;
 const MASS: usize = 1;
 
@@ -31,7 +55,7 @@ impl BodyModel {
     /// [`Error::Wanted`] if a measurement is beyond what people have, the model doesn't know it, or no body of the model
     /// within six standard deviations has it.
     pub fn alpha_for(&self, wanted: &Wanted) -> Result<Vec<f64>> {
-        check_wanted(wanted)?;
+        wanted.check()?;
         let sex = wanted.sex.map(|sex| if sex == Sex::Male { 1.0 } else { -1.0 });
         let asked = [wanted.stature_m, wanted.mass_kg, sex, wanted.age_years];
         let names = ["stature", "mass", "sex", "age"];
@@ -125,28 +149,13 @@ fn condition(features: &[(usize, &Feature, f64)], n: usize) -> (DVector<f64>, DM
     }
 }
 
-fn check_wanted(wanted: &Wanted) -> Result<()> {
-    let ranges = [
-        ("stature", wanted.stature_m, 1.0, 2.4, "m"),
-        ("mass", wanted.mass_kg, 20.0, 250.0, "kg"),
-        ("age", wanted.age_years, 0.0, 120.0, "years"),
-    ];
-    for (name, value, low, high, unit) in ranges {
-        if let Some(value) = value
-            && !(low..=high).contains(&value)
-        {
-            let what = format!("{name} of {value} {unit} was asked for, expected {low} to {high}");
-            return Err(Error::Wanted { what });
-        }
-    }
-    Ok(())
-}
-
 fn check_found(alpha: &[f64]) -> Result<()> {
     let most = alpha.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
-    if most <= 6.0 {
+    if most <= MAX_DEVIATIONS {
         return Ok(());
     }
-    let what = format!("such a body is {most:.1} standard deviations from the mean, expected at most 6");
+    let what = format!(
+        "such a body is {most:.1} standard deviations from the mean, expected at most {MAX_DEVIATIONS}"
+    );
     Err(Error::Wanted { what })
 }

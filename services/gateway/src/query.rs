@@ -214,15 +214,15 @@ mod tests {
         name: Option<String>,
     }
 
-    fn of(query: &str) -> Result<Wanted> {
+    fn asked(query: &str) -> Result<Wanted> {
         read(&format!("/v1/x{query}").parse().unwrap())
     }
 
     #[test]
     fn a_query_is_read_or_refused_by_the_name_of_the_parameter() {
         let wanted = Wanted { limit: Some(3), stature_m: Some(1.8), name: Some("a b".into()) };
-        assert_eq!(of("?limit=3&stature_m=1.8&name=a%20b").unwrap(), wanted);
-        assert_eq!(of("").unwrap(), Wanted { limit: None, stature_m: None, name: None });
+        assert_eq!(asked("?limit=3&stature_m=1.8&name=a%20b").unwrap(), wanted);
+        assert_eq!(asked("").unwrap(), Wanted { limit: None, stature_m: None, name: None });
         for (query, expected) in [
             ("?limit=x", "limit is \"x\", expected a whole number of 0 or more"),
             ("?limit=-1", "limit is \"-1\", expected a whole number of 0 or more"),
@@ -231,7 +231,7 @@ mod tests {
             ("?x=1", "x is not known; there are: limit, stature_m, name"),
             ("?name=a%00", "name has a NUL character, expected text without"),
         ] {
-            let refused = of(query).unwrap_err();
+            let refused = asked(query).unwrap_err();
             assert!(matches!(&refused, Error::BadRequest(said) if said == expected), "{query}: {refused}");
         }
     }

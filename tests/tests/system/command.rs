@@ -162,7 +162,9 @@ fn the_first_session_goes_by_the_commands_of_the_help() -> Result<()> {
 /// An upload that fails at once, and what is asked of the session that it does not make.
 fn leaves_no_session_behind(here: &Path) -> Result<()> {
     fs::write(here.join("notes.txt"), "a stand-in for the performer")?;
-    for (file, expected) in [("missing.csv", "missing.csv"), ("notes.txt", "--role")] {
+    for (file, expected) in
+        [("missing.csv", "missing.csv"), ("notes.txt", "control-points .csv, .trc or .c3d")]
+    {
         let refused = marey(here, &["upload", "take 9", file]).unwrap_err().to_string();
         assert!(refused.contains(expected), "{refused}");
         let none = marey(here, &["run", "take 9", "--database", "walks"]).unwrap_err().to_string();

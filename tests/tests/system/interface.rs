@@ -65,6 +65,44 @@ fn parameters_that_make_no_sense_are_refused_by_name() -> Result<()> {
 }
 
 #[test]
+fn a_query_parameter_that_a_path_does_not_have_is_refused_by_name() -> Result<()> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    let session = api.session("s", &[])?;
+    for (answer, expected) in [
+        (api.get("/v1/sessions?colour=red&limit=1")?, "\"colour\" is not known; there are: "),
+        (
+            api.get(&format!("{session}?limit=1"))?,
+            "\"limit\" is not known; there are no query parameters here",
+        ),
+        (api.post("/v1/sessions?name=b", &json!({"name": "a"}))?, "\"name\" is not known; "),
+        (
+            api.put(&format!("{session}/files/points.csv?rôle=control-points"), b"x")?,
+            "\"rôle\" is not known; ",
+        ),
+        (api.delete(&format!("{session}?force"))?, "\"force\" is not known; "),
+    ] {
+        let detail = answer.json()["detail"].as_str().unwrap_or_default().to_owned();
+        assert_eq!(answer.status, 400, "{expected}: {detail}");
+        assert!(detail.starts_with(expected), "{detail}");
+    }
+    assert_eq!(api.get(&session)?.status, 200, "nothing was deleted");
+    assert_eq!(api.get("/healthz?from=probe")?.status, 200, "probes may ask as they like");
+    Ok(())
+}
+
+#[test]
+fn an_empty_tag_is_called_a_tag() -> Result<()> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    let refused = api.post("/v1/sessions", &json!({"name": "a", "tags": ["x", ""]}))?;
+    assert_eq!(refused.status, 422);
+    let detail = refused.json()["detail"].clone();
+    assert_eq!(detail, "tags[1] has 0 characters, expected 1 to 200 without control characters");
+    Ok(())
+}
+
+#[test]
 fn lists_are_paged_newest_first_without_gap_or_repetition() -> Result<()> {
     let api = system::shared().project("pages")?;
     let names: Vec<String> = (0..7).map(|n| format!("session {n}")).collect();

@@ -167,3 +167,23 @@ fn the_files_of_a_motion_database_are_fixed_once_it_is_being_built() -> Result<(
     assert_eq!(system.num_objects(), 0);
     Ok(())
 }
+
+#[test]
+fn a_file_that_no_session_has_is_refused_with_what_it_could_be() -> Result<()> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    let session = api.session("s", &[])?;
+    for (file, expected) in [
+        ("notes.txt", "\"notes.txt\" ends like no file of a session, expected one of: "),
+        ("points", "\"points\" ends like no file of a session"),
+        ("walk.bvh?role=motion", "role motion is for files that motion databases are built from"),
+        ("scans.zip?role=scans", "role scans is for files that body models are built from"),
+    ] {
+        let refused = api.put(&format!("{session}/files/{file}"), b"x")?;
+        let detail = refused.json()["detail"].as_str().unwrap_or_default().to_owned();
+        assert_eq!(refused.status, 422, "{file}: {detail}");
+        assert!(detail.starts_with(expected), "{file}: {detail}");
+    }
+    assert_eq!(names(&api, &session)?, Vec::<String>::new());
+    Ok(())
+}

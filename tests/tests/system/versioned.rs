@@ -165,3 +165,20 @@ fn only_what_is_ready_is_used() -> Result<()> {
         Ok(())
     })
 }
+
+#[test]
+fn the_number_of_a_deleted_version_is_not_used_again() -> Result<()> {
+    on_both(|_, api, noun| {
+        let path = noun.path;
+        for version in 1..=3 {
+            assert_eq!(api.make(path, &json!({"name": "a"}))?["version"], version);
+        }
+        for which in ["a@3", "a@1", "a@2"] {
+            assert_eq!(api.delete(&format!("{path}/{which}"))?.status, 204, "{which}");
+        }
+        assert_eq!(api.make(path, &json!({"name": "a"}))?["version"], 4);
+        assert_eq!(api.get(&format!("{path}/a@3"))?.status, 404);
+        assert_eq!(api.make(path, &json!({"name": "b"}))?["version"], 1, "names are counted apart");
+        Ok(())
+    })
+}

@@ -1,6 +1,6 @@
 //! Runs by inverse kinematics: poses of a body whose measured points are reached.
 
-use body::UnknownSex;
+use body::{MAX_DEVIATIONS, UnknownSex, Wanted};
 use formats::FileRole;
 use jobs::inverse_kinematics::{
     BodyDescription, InverseKinematics, Method, RUN_KIND, Sex, SolveInverseKinematics,
@@ -24,11 +24,6 @@ use crate::{
 
 /// Most steps of one solve, and those when left out.
 const STEPS: (usize, usize) = (200, 15);
-/// What people measure, as bodies of a model are looked for: field, least and most.
-const MEASUREMENTS: [(&str, f64, f64); 3] =
-    [("stature_m", 1.0, 2.4), ("mass_kg", 20.0, 250.0), ("age_years", 0.0, 120.0)];
-/// Most standard deviations that a coefficient is from the mean.
-const MOST_DEVIATIONS: f64 = 6.0;
 /// Frames a second.
 const FRAME_RATES: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
@@ -166,27 +161,23 @@ impl InverseKinematicsRequest {
     /// Refuses a body that nobody has, and one that is described in two ways.
     fn check_body(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::Unprocessable(what));
-        let sex = self.sex()?;
-        let measured = [self.stature_m, self.mass_kg, self.age_years];
-        for ((field, least, most), value) in MEASUREMENTS.into_iter().zip(measured) {
-            if let Some(value) = value.filter(|value| !(least..=most).contains(value)) {
-                return refuse(format!("{field} is {value}, expected {least} to {most}"));
-            }
-        }
+        let (stature_m, mass_kg, age_years) = (self.stature_m, self.mass_kg, self.age_years);
+        let wanted = Wanted { stature_m, mass_kg, age_years, sex: self.sex()? };
+        wanted.check().map_err(|error| Error::Unprocessable(error.to_string()))?;
         if self.alpha.is_empty() {
             return Ok(());
         }
-        if sex.is_some() || measured.iter().any(Option::is_some) {
+        if wanted != Wanted::default() {
             return refuse("alpha is given beside measurements, expected one of the two".into());
         }
         if self.alpha.len() > body::MAX_COMPONENTS {
             let (found, most) = (self.alpha.len(), body::MAX_COMPONENTS);
             return refuse(format!("alpha has {found} numbers, expected at most {most}"));
         }
-        match self.alpha.iter().enumerate().find(|(_, a)| a.abs() > MOST_DEVIATIONS) {
+        match self.alpha.iter().enumerate().find(|(_, a)| a.abs() > MAX_DEVIATIONS) {
             None => Ok(()),
             Some((number, a)) => refuse(format!(
-                "alpha[{number}] is {a}, expected -{MOST_DEVIATIONS} to {MOST_DEVIATIONS} standard deviations"
+                "alpha[{number}] is {a}, expected -{MAX_DEVIATIONS} to {MAX_DEVIATIONS} standard deviations"
             )),
         }
     }
