@@ -66,7 +66,7 @@ fn parameters_that_make_no_sense_are_refused_by_name() -> Result<()> {
 
 #[test]
 fn a_query_parameter_that_a_path_does_not_have_is_refused_by_name() -> Result<()> {
-    let system = System::start()?;
+    let system = tests::System::start()?;
     let api = system.project("p")?;
     let session = api.session("s", &[])?;
     for (answer, expected) in [
@@ -93,7 +93,7 @@ fn a_query_parameter_that_a_path_does_not_have_is_refused_by_name() -> Result<()
 
 #[test]
 fn an_empty_tag_is_called_a_tag() -> Result<()> {
-    let system = System::start()?;
+    let system = tests::System::start()?;
     let api = system.project("p")?;
     let refused = api.post("/v1/sessions", &json!({"name": "a", "tags": ["x", ""]}))?;
     assert_eq!(refused.status, 422);
