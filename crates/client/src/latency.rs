@@ -59,12 +59,12 @@ mod tests {
 
     #[test]
     fn latencies_are_shown_where_there_are_some() {
-        let of = |seconds: &[f64], frames| Latency::from_seconds(seconds.to_vec(), frames, 2).to_string();
-        assert_eq!(of(&[], 2), "2 frames, 0 poses, 2 dropped");
-        let shown = of(&[0.001], 3);
+        let shown = |seconds: &[f64], frames| Latency::from_seconds(seconds.to_vec(), frames, 2).to_string();
+        assert_eq!(shown(&[], 2), "2 frames, 0 poses, 2 dropped");
+        let one = shown(&[0.001], 3);
         assert!(
-            shown.starts_with("3 frames, 1 poses, 2 dropped; latency p50 1.00 ms, p95 1.00 ms"),
-            "{shown}"
+            one.starts_with("3 frames, 1 poses, 2 dropped; latency p50 1.00 ms, p95 1.00 ms"),
+            "{one}"
         );
     }
 }

@@ -36,8 +36,8 @@ mod tests {
     #[test]
     fn only_finite_numbers_are_taken() {
         for text in ["nan", "NaN", "-nan", "inf", "-inf", "infinity", "1e999", "", "1,5", "1.8 m"] {
-            for of in [finite, not_negative, positive] {
-                let error = of(text).unwrap_err();
+            for parse in [finite, not_negative, positive] {
+                let error = parse(text).unwrap_err();
                 assert!(error.starts_with(&format!("found {text:?}, expected a finite number")), "{error}");
             }
         }
