@@ -1,7 +1,7 @@
 //! Starting and stopping the cluster.
 
 use std::fs::{File, TryLockError};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -11,6 +11,7 @@ use sqlx::{AssertSqlSafe, Connection, Executor, PgConnection};
 
 use crate::Error;
 use crate::config::Config;
+use crate::lock_file;
 use crate::programs::Programs;
 use crate::server_user::ServerUser;
 use crate::watchdog::Watchdog;
@@ -23,6 +24,11 @@ const PORT: u16 = 5432;
 
 /// `sun_path` of `sockaddr_un`, less its final NUL.
 const SOCKET_PATH_LIMIT: usize = 107;
+
+/// So many lines of the server's log are told when a program fails,
+const LOG_LINES: usize = 10;
+/// which are looked for in its last bytes.
+const LOG_BYTES: u64 = 16 << 10;
 
 /// A cluster that runs. Dropping it stops it.
 pub struct PrivateCluster {
@@ -41,7 +47,7 @@ impl PrivateCluster {
     /// # Errors
     /// [`Error::InUse`] if another process runs it.
     pub fn start(config: Config) -> Result<Self, Error> {
-        let socket = config.socket_dir.join(format!(".s.PGSQL.{PORT}"));
+        let socket = socket(&config);
         let found = socket.as_os_str().as_bytes().len();
         if found > SOCKET_PATH_LIMIT {
             return Err(Error::SocketPathTooLong { path: socket, found, limit: SOCKET_PATH_LIMIT });
@@ -51,6 +57,7 @@ impl PrivateCluster {
         user.own_folder(&config.data_dir)?;
         user.own_folder(&config.socket_dir)?;
         let lock = lock(&config)?;
+        lock_file::release(&config, &socket)?;
         if !config.data_dir.join("PG_VERSION").exists() {
             init(&programs, &user, &config)?;
         } else if pg_ctl(&programs, &user, &config)
@@ -130,7 +137,7 @@ impl PrivateCluster {
 
     /// Starts the server after [`stop_immediate`](Self::stop_immediate).
     pub fn start_server(&self) -> Result<(), Error> {
-        let log = self.config.data_dir.join("server.log");
+        let log = server_log(&self.config);
         let mut command = pg_ctl(&self.programs, &self.user, &self.config);
         run("pg_ctl", &self.config, command.args(["start", "-w", "-t", "120", "-l"]).arg(log))
     }
@@ -140,10 +147,8 @@ impl PrivateCluster {
         self.end();
         let running = pg_ctl(&self.programs, &self.user, &self.config).arg("status").status();
         if self.config.durable && running.is_ok_and(|status| status.success()) {
-            return Err(Error::Program {
-                program: "pg_ctl",
-                output: "the server did not stop in time".to_owned(),
-            });
+            let output = "the server did not stop in time".to_owned();
+            return Err(Error::Program { program: "pg_ctl", output: with_server_log(output, &self.config) });
         }
         Ok(())
     }
@@ -151,6 +156,10 @@ impl PrivateCluster {
 
 impl PrivateCluster {
     fn end(&mut self) {
+        // Or the watchdog would wait for a killed server that nobody reaps.
+        if let Err(error) = lock_file::release(&self.config, &socket(&self.config)) {
+            tracing::warn!(%error, "lock file of the private cluster could not be let go of");
+        }
         self.watchdog.finish();
         if !self.config.durable {
             // The watchdog has emptied them, but may not remove them from a folder of ours.
@@ -165,6 +174,14 @@ impl Drop for PrivateCluster {
     fn drop(&mut self) {
         self.end();
     }
+}
+
+fn socket(config: &Config) -> PathBuf {
+    config.socket_dir.join(format!(".s.PGSQL.{PORT}"))
+}
+
+fn server_log(config: &Config) -> PathBuf {
+    config.data_dir.join("server.log")
 }
 
 /// Beside the folder and not in it, so that it is never removed under another process.
@@ -259,15 +276,37 @@ fn run(program: &'static str, config: &Config, command: &mut Command) -> Result<
     if status.success() {
         return Ok(());
     }
-    let mut output = String::new();
-    let read = log.seek(SeekFrom::Start(0)).and_then(|_| log.read_to_string(&mut output));
+    let mut output = Vec::new();
+    let read = log.seek(SeekFrom::Start(0)).and_then(|_| log.read_to_end(&mut output));
     read.map_err(Error::io(&path))?;
-    output.push_str(&last_lines(&config.data_dir.join("server.log"), 10));
-    Err(Error::Program { program, output: output.trim().to_owned() })
+    let mut output = String::from_utf8_lossy(&output).trim().to_owned();
+    if output.is_empty() {
+        output = status.to_string();
+    }
+    Err(Error::Program { program, output: with_server_log(output, config) })
 }
 
-fn last_lines(path: &Path, count: usize) -> String {
-    let text = std::fs::read_to_string(path).unwrap_or_default();
+/// What a program printed, and the end of the server's log.
+fn with_server_log(mut output: String, config: &Config) -> String {
+    let path = server_log(config);
+    match last_lines(&path, LOG_LINES) {
+        Ok(lines) if lines.is_empty() => {}
+        Ok(lines) => output.push_str(&format!("\nthe last lines of {}:\n{lines}", path.display())),
+        // There is none before the server was first started.
+        Err(error) if error.kind() == ErrorKind::NotFound => {}
+        Err(error) => output.push_str(&format!("\n{}: {error}", path.display())),
+    }
+    output
+}
+
+/// The last lines of a file that may be long, and in any encoding.
+fn last_lines(path: &Path, count: usize) -> std::io::Result<String> {
+    let mut file = File::open(path)?;
+    let length = file.metadata()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(LOG_BYTES)))?;
+    let mut bytes = Vec::new();
+    file.take(LOG_BYTES).read_to_end(&mut bytes)?;
+    let text = String::from_utf8_lossy(&bytes);
     let lines: Vec<&str> = text.lines().collect();
-    lines[lines.len().saturating_sub(count)..].join("\n")
+    Ok(lines[lines.len().saturating_sub(count)..].join("\n"))
 }

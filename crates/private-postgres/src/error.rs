@@ -65,7 +65,7 @@ pub enum Error {
     Program {
         /// Which.
         program: &'static str,
-        /// What it printed, and the end of the server's log.
+        /// What it printed, and the end of the server's log with its path.
         output: String,
     },
 }

@@ -26,6 +26,7 @@
 mod cluster;
 mod config;
 mod error;
+mod lock_file;
 mod programs;
 mod server_user;
 mod watchdog;

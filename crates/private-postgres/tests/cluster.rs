@@ -70,6 +70,64 @@ async fn data_survive_a_stop_a_crash_and_a_killed_server() {
     PgConnection::connect_with(&url_options).await.unwrap();
 }
 
+/// What a killed server leaves: lock files of the folder and of the socket, with its pid.
+fn leave_lock_files(folder: &Path, pid: u32) {
+    let text = format!("{pid}\n{}\n", folder.join("data").display());
+    for name in ["data/postmaster.pid", "socket/.s.PGSQL.5432.lock"] {
+        std::fs::write(folder.join(name), &text).unwrap();
+    }
+}
+
+#[test]
+fn a_killed_server_that_nobody_reaps_is_in_nobodys_way() {
+    let folder = folder();
+    PrivateCluster::start(config(folder.path(), true)).unwrap().stop().unwrap();
+    let mut zombie = Command::new("true").spawn().unwrap();
+    let stat = format!("/proc/{}/stat", zombie.id());
+    wait_until("the zombie", || std::fs::read_to_string(&stat).unwrap().contains(") Z "));
+
+    leave_lock_files(folder.path(), zombie.id());
+    let cluster = PrivateCluster::start(config(folder.path(), true)).unwrap();
+    let server = postmaster(folder.path()).unwrap();
+    assert_ne!(server, zombie.id());
+
+    // and while we run: the end does not wait for it
+    assert!(Command::new("kill").args(["-9", &server.to_string()]).status().unwrap().success());
+    leave_lock_files(folder.path(), zombie.id());
+    let begin = Instant::now();
+    cluster.stop().unwrap();
+    assert!(begin.elapsed() < Duration::from_secs(30), "{:?}", begin.elapsed());
+    zombie.wait().unwrap();
+}
+
+#[test]
+fn a_process_that_has_the_pid_of_a_killed_server_is_left_alone() {
+    let folder = folder();
+    PrivateCluster::start(config(folder.path(), true)).unwrap().stop().unwrap();
+    let mut other = Command::new("sleep").arg("600").current_dir("/").spawn().unwrap();
+    leave_lock_files(folder.path(), other.id());
+    let started = PrivateCluster::start(config(folder.path(), true));
+    let ended = other.try_wait().unwrap();
+    other.kill().unwrap();
+    other.wait().unwrap();
+    started.unwrap().stop().unwrap();
+    assert_eq!(ended, None);
+}
+
+#[test]
+fn a_server_that_does_not_start_says_why_and_where_its_log_is() {
+    let folder = folder();
+    PrivateCluster::start(config(folder.path(), true)).unwrap().stop().unwrap();
+    let settings = folder.path().join("data/postgresql.conf");
+    let mut file = std::fs::File::options().append(true).open(settings).unwrap();
+    std::io::Write::write_all(&mut file, b"\nwalk_speed = 3\n").unwrap();
+    let message = PrivateCluster::start(config(folder.path(), true)).err().unwrap().to_string();
+    assert!(message.starts_with("pg_ctl failed: "), "{message}");
+    assert!(message.contains("unrecognized configuration parameter \"walk_speed\""), "{message}");
+    let log = folder.path().join("data/server.log").display().to_string();
+    assert!(message.contains(&format!("the last lines of {log}:\n")), "{message}");
+}
+
 #[test]
 fn no_tcp_port_is_opened_and_nobody_else_may_enter() {
     use std::os::unix::fs::PermissionsExt;
