@@ -62,6 +62,8 @@ pub struct Args {
 /// # Errors
 /// If a part of it fails or falls short of what it should show.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    // before anything is started or made: a folder that can't be used leaves nothing behind
+    let given = args.data.as_deref().map(HeldOut::in_folder).transpose()?;
     let mut telemetry = TelemetryConfig::from_variables(&Variables::new(&environment))?;
     telemetry.filter.get_or_insert_with(|| "error".into());
     service::telemetry::start(&telemetry)?;
@@ -76,9 +78,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let started = Everything::start(&up, shutdown.clone()).await?;
         let everything = started.context("stopped before it had begun")?;
         let client = Client::new(everything.server.clone());
-        let data = args.data.clone();
         let show = tokio::task::spawn_blocking(move || {
-            let summary = show(&client, data.as_deref(), folder, &output)?;
+            let summary = show(&client, given, folder, &output)?;
             summary.print(begin.elapsed(), &output)
         });
         // Ctrl-C ends the services, and so whatever waits for them
@@ -96,18 +97,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     })
 }
 
-/// Everything that is shown; results go to `output`.
-fn show(client: &Client, data: Option<&Path>, folder: &Path, output: &Path) -> anyhow::Result<Summary> {
-    let recordings = match data {
-        Some(data) => data.to_owned(),
-        None => draw_trials(&folder.join("recordings"))?,
+/// Everything that is shown, on `given` recordings or drawn ones; results go to `output`.
+fn show(client: &Client, given: Option<HeldOut>, folder: &Path, output: &Path) -> anyhow::Result<Summary> {
+    let is_synthetic = given.is_none();
+    let HeldOut { tested, learned } = match given {
+        Some(given) => given,
+        None => HeldOut::in_folder(&draw_trials(&folder.join("recordings"))?)?,
     };
-    let HeldOut { tested, learned } = HeldOut::choose(Take::find_all(&recordings)?)?;
     println!("Learning from {}; {} are held out", counted(learned.len() as u64, "trial"), tested.len());
     let database = build(client, &learned)?;
     let trials = trials::reconstruct(client, &database, &tested, output)?;
     let followed = cameras::show(client, folder, output)?;
-    Ok(Summary { is_synthetic: data.is_none(), num_learned: learned.len(), trials, followed })
+    Ok(Summary { is_synthetic, num_learned: learned.len(), trials, followed })
 }
 
 /// Draws recordings; those of an earlier demo were the same.
@@ -130,4 +131,61 @@ fn build(client: &Client, takes: &[Take]) -> anyhow::Result<MotionDatabase> {
         bail!("the motion database has no pose");
     }
     Ok(database)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said of a folder with these files; no folder for results may be left.
+    fn refused(files: &[&str]) -> anyhow::Result<String> {
+        let place = tempfile::tempdir()?;
+        let (data, out) = (place.path().join("data"), place.path().join("out"));
+        fs::create_dir(&data)?;
+        for name in files {
+            fs::write(data.join(name), "x")?;
+        }
+        let message = refusal(data, &out);
+        assert!(!out.exists(), "{files:?}");
+        Ok(message)
+    }
+
+    fn refusal(data: PathBuf, out: &Path) -> String {
+        let args = Args { data: Some(data), out: Some(out.to_owned()), keep: false };
+        format!("{:#}", run(&args).unwrap_err())
+    }
+
+    #[test]
+    fn a_folder_that_is_no_use_is_refused_before_anything_is_made() -> anyhow::Result<()> {
+        for files in [&[][..], &["notes.txt"], &["16.asf"]] {
+            let message = refused(files)?;
+            assert!(message.contains("data: found 0 recorded trials (ASF with AMC"), "{message}");
+        }
+        let message = refused(&["1.bvh", "2.bvh"])?;
+        assert!(message.ends_with("found 2 recorded trials (ASF with AMC, or BVH), expected at least 3"));
+        let message = refused(&["16_1.amc", "16_2.amc", "16_3.amc"])?;
+        let expected = "found no ASF file with the skeleton of 3 AMC files: 16_1.amc, 16_2.amc, 16_3.amc;";
+        assert!(message.contains(expected), "{message}");
+
+        let place = tempfile::tempdir()?;
+        let (data, out) = (place.path().join("gone"), place.path().join("out"));
+        let message = refusal(data.clone(), &out);
+        assert!(message.contains("gone: No such file"), "{message}");
+        fs::write(&data, "x")?;
+        let message = refusal(data, &out);
+        assert!(message.ends_with("gone is a file, expected a folder of recordings"), "{message}");
+        assert!(!out.exists());
+        Ok(())
+    }
+
+    #[test]
+    fn motions_without_a_skeleton_are_left_out_of_those_that_have_one() -> anyhow::Result<()> {
+        let data = tempfile::tempdir()?;
+        for name in ["1.bvh", "2.bvh", "3.bvh", "16_1.amc"] {
+            fs::write(data.path().join(name), "x")?;
+        }
+        let HeldOut { tested, learned } = HeldOut::in_folder(data.path())?;
+        assert_eq!(tested.len() + learned.len(), 3);
+        Ok(())
+    }
 }

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use formats::{
     archive::{self, Entry, Limits},
     motion_files::{self, FileUse, Pairing},
@@ -38,9 +38,24 @@ pub struct Recording {
     pub skeleton_text: Option<Vec<u8>>,
 }
 
+/// The takes of a folder.
+#[derive(Debug)]
+pub struct Takes {
+    /// by name
+    pub takes: Vec<Take>,
+    /// motion files that are no takes: AMC, of which no ASF is the skeleton
+    pub without_skeleton: Vec<PathBuf>,
+}
+
 impl Take {
-    /// All takes under `folder`, by name. AMC files without an ASF are left out.
-    pub fn find_all(folder: &Path) -> anyhow::Result<Vec<Self>> {
+    /// All takes under `folder`.
+    ///
+    /// # Errors
+    /// If it is no folder, or can't be read.
+    pub fn find_all(folder: &Path) -> anyhow::Result<Takes> {
+        if !fs::metadata(folder).with_context(|| folder.display().to_string())?.is_dir() {
+            bail!("{} is a file, expected a folder of recordings", folder.display());
+        }
         let mut files = Vec::new();
         pack::collect(folder, folder, &mut files)?;
         let mut files: Vec<(String, PathBuf)> =
@@ -53,14 +68,18 @@ impl Take {
         let skeletons: Vec<&(String, PathBuf)> = files.iter().filter(|(name, _)| is_skeleton(name)).collect();
         // as a motion database built from the folder pairs them
         let pairing = Pairing::new(skeletons.iter().map(|(name, _)| name.as_str()));
+        let mut without_skeleton = Vec::new();
         let mut takes: Vec<Self> = files
             .iter()
             .filter_map(|(name, path)| {
                 let FileUse::Motion(format) = FileUse::from_name(name) else { return None };
                 let skeleton = if format.has_own_skeleton() {
                     None
+                } else if let Some(index) = pairing.skeleton_of(name) {
+                    Some(skeletons[index].1.clone())
                 } else {
-                    Some(skeletons[pairing.skeleton_of(name)?].1.clone())
+                    without_skeleton.push(path.clone());
+                    return None;
                 };
                 let beside =
                     |index: &&&PathBuf| index.parent().is_some_and(|folder| path.starts_with(folder));
@@ -69,7 +88,7 @@ impl Take {
             })
             .collect();
         takes.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(takes)
+        Ok(Takes { takes, without_skeleton })
     }
 
     /// The name up to `_`: whose take it is.
@@ -135,7 +154,7 @@ mod tests {
             fs::create_dir_all(path.parent().context("a folder")?)?;
             fs::write(path, "x")?;
         }
-        let takes = Take::find_all(folder.path())?;
+        let Takes { takes, without_skeleton } = Take::find_all(folder.path())?;
         let found: Vec<_> = takes
             .iter()
             .map(|take| {
@@ -143,6 +162,7 @@ mod tests {
             })
             .collect();
         assert_eq!(found, [("16_15", Some(true)), ("ann_2_1", Some(false)), ("walk", None)]);
+        assert_eq!(without_skeleton, [folder.path().join("takes/other.amc")]);
         assert_eq!(takes[1].skeleton, Some(folder.path().join("bodies/ann_2.asf")));
         Ok(())
     }

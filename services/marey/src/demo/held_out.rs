@@ -1,8 +1,13 @@
 //! Which takes are reconstructed, and which are learned from.
 
-use anyhow::bail;
+use std::path::{Path, PathBuf};
 
-use crate::take::Take;
+use anyhow::{Context, bail};
+
+use crate::{
+    take::{Take, Takes},
+    words::counted,
+};
 
 /// Takes that are held out, at most: the standard error of their mean is less than a fifth of their spread.
 const MOST: usize = 32;
@@ -18,7 +23,35 @@ pub struct HeldOut {
     pub learned: Vec<Take>,
 }
 
+/// AMC files without a skeleton that are named.
+const NAMED: usize = 5;
+
 impl HeldOut {
+    /// Divides the takes of a folder, and says which of its files are none.
+    ///
+    /// # Errors
+    /// If it is no folder, or too few takes are in it.
+    pub fn in_folder(folder: &Path) -> anyhow::Result<Self> {
+        let Takes { takes, without_skeleton } = Take::find_all(folder)?;
+        let in_folder = || folder.display().to_string();
+        if without_skeleton.is_empty() {
+            return Self::choose(takes).with_context(in_folder);
+        }
+        let without_skeleton = format!(
+            "no ASF file with the skeleton of {}: {}",
+            counted(without_skeleton.len() as u64, "AMC file"),
+            named(folder, &without_skeleton)
+        );
+        if takes.is_empty() {
+            bail!(
+                "{}: found {without_skeleton}; expected one beside them, such as 16.asf for 16_15.amc",
+                in_folder()
+            );
+        }
+        eprintln!("warning: {}: {without_skeleton}; left out", in_folder());
+        Self::choose(takes).with_context(in_folder)
+    }
+
     /// Divides takes in the order of their names: out of each five takes of a performer one is held out, evenly until there are
     /// enough. The same every time, whatever their motion. All performers stay among those learned from.
     ///
@@ -26,7 +59,8 @@ impl HeldOut {
     /// If there are fewer than three.
     pub fn choose(mut takes: Vec<Take>) -> anyhow::Result<Self> {
         if takes.len() < 3 {
-            bail!("found {} recorded trials (ASF with AMC, or BVH), expected at least 3", takes.len());
+            let found = counted(takes.len() as u64, "recorded trial");
+            bail!("found {found} (ASF with AMC, or BVH), expected at least 3");
         }
         // where actions come in turn, so do those of every fifth take; by letters 100 would follow 1
         takes.sort_by_cached_key(|take| parts(&take.name));
@@ -51,6 +85,15 @@ impl HeldOut {
         }
         Ok(Self { tested, learned })
     }
+}
+
+fn named(folder: &Path, files: &[PathBuf]) -> String {
+    let name = |path: &PathBuf| path.strip_prefix(folder).unwrap_or(path).display().to_string();
+    let mut names: Vec<String> = files.iter().take(NAMED).map(name).collect();
+    if files.len() > NAMED {
+        names.push(format!("and {} more", files.len() - NAMED));
+    }
+    names.join(", ")
 }
 
 /// A name in parts that are numbers or none.
