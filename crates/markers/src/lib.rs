@@ -20,6 +20,7 @@ mod map;
 mod names;
 mod parse;
 mod presets;
+mod standard;
 mod template;
 
 pub use apply::{Mapped, MappedPoint, upside_down};
@@ -28,6 +29,7 @@ pub use error::Error;
 pub use map::{Group, MarkerMap, Point};
 pub use names::find_name;
 pub use presets::{preset, presets};
+pub use standard::{STANDARD, standard_names};
 pub use template::template;
 
 /// Result of this crate.

@@ -1,21 +1,24 @@
 use std::fmt::Write;
 
-use crate::Fit;
-
-/// The control points that every CMU-like skeleton has.
-const STANDARD: [&str; 6] = ["left_wrist", "right_wrist", "left_ankle", "right_ankle", "root", "head"];
+use crate::{Fit, STANDARD, standard_names};
 
 /// A map to begin with, for people to edit: what the fit found in the file, and all names of the file. Without a fit every
-/// point is left to be filled in.
+/// point is left to be filled in, but for those that the file has under their own names.
 pub fn template(names: &[String], fit: Option<&Fit<'_>>) -> String {
     let mut out = String::from(
         "# Marker map. Each control point is the mean of its markers. Names are without the prefix.\n",
     );
+    let own = if fit.is_none() { standard_names(names) } else { Vec::new() };
     // Writing to a string cannot fail.
     let _ = match fit {
         Some(fit) => {
             writeln!(out, "# Made from the marker set {}.\nprefix = {}", fit.map.name, quoted(&fit.prefix))
         }
+        None if !own.is_empty() => writeln!(
+            out,
+            "# The file holds control points under the standard names: it can be used without a map.\n\
+             prefix = \"\""
+        ),
         None => writeln!(out, "# No known marker set fits: fill in the names.\nprefix = \"\""),
     };
     out.push_str(
@@ -52,6 +55,10 @@ pub fn template(names: &[String], fit: Option<&Fit<'_>>) -> String {
         }
         let _ = writeln!(out, "{} = {{ markers = [{markers}]{further} }}", key(&point.name));
         written.push(point.name.as_str());
+    }
+    for name in own {
+        let _ = writeln!(out, "{name} = {{ markers = [{}] }}", quoted(name));
+        written.push(name);
     }
     for name in STANDARD.iter().filter(|name| !written.contains(name)) {
         let _ = writeln!(out, "# {name} = [\"\", \"\"]");

@@ -8,7 +8,7 @@ use std::{
 use anyhow::{Context, bail};
 use client::parameters;
 use formats::{PointsOptions, Read, session};
-use markers::{Fit, MarkerMap, fits};
+use markers::{Fit, MarkerMap, fits, standard_names};
 use model::{Axis, PointTrajectories};
 use serde_json::{Map, Value};
 
@@ -19,8 +19,9 @@ const SHOWN: usize = 3;
 
 /// Show which markers a file has and which control points they make
 ///
-/// Compares the names in a C3D, TRC or CSV file with the known marker sets. `marey run` takes the best one by itself if there
-/// is no doubt; --write makes a marker map of it, a text file to edit and to give to `marey run --map`.
+/// Compares the names in a C3D, TRC or CSV file with the known marker sets. `marey run` takes the best one by
+/// itself if there is no doubt, and needs none for control points under their standard names, such as
+/// left_wrist. --write makes a marker map of it, a text file to edit and to give to `marey run --map`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey markers take3.c3d
@@ -73,6 +74,16 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         counted(file.num_frames() as u64, "frame"),
         file.frame_rate()
     );
+    // as runs take them: names that are control points come before any marker set
+    let standard = if args.map.is_none() { standard_names(file.names()) } else { Vec::new() };
+    if !standard.is_empty() {
+        println!("{}", as_they_are(file.names(), &standard));
+        show(&MarkerMap::from_pairs(standard.iter().map(|name| (*name, *name))), &file)?;
+        if let Some(to) = &args.write {
+            write(to, &file, None)?;
+        }
+        return Ok(());
+    }
     let found = fits(file.names());
     let detected = markers::detect(file.names());
     let map = match (&args.map, &detected) {
@@ -84,6 +95,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }
     };
     if let Some(map) = &map {
+        let prefix = map.prefix.as_deref().unwrap_or_default();
+        let name = if map.name.is_empty() { "marker map" } else { &map.name };
+        println!("{name}{}:", if prefix.is_empty() { String::new() } else { format!(" for {prefix}") });
         show(map, &file)?;
     }
     println!("\nknown marker sets that have some of the names:");
@@ -115,12 +129,27 @@ fn list() {
     }
 }
 
+/// What a file is whose names are control points. Those beside the standard ones must be joints: only a run,
+/// which has a skeleton, can tell.
+fn as_they_are(names: &[String], standard: &[&str]) -> String {
+    let standard_list = standard.join(",");
+    let others: Vec<&str> =
+        names.iter().map(String::as_str).filter(|name| !standard.contains(name)).collect();
+    if others.is_empty() {
+        return "holds control points under their standard names and can be used as it is: \
+                a sparse run needs no --map"
+            .to_owned();
+    }
+    format!(
+        "holds control points under their standard names: a sparse run needs no --map. Its other \
+         names ({}) must be joints of the skeleton; if they are not, choose with --points {standard_list}",
+        others.join(", ")
+    )
+}
+
 /// The control points that a map makes of a file.
 fn show(map: &MarkerMap, file: &PointTrajectories) -> anyhow::Result<()> {
     let mapped = map.apply(file, &[])?;
-    let prefix = map.prefix.as_deref().unwrap_or_default();
-    let name = if map.name.is_empty() { "marker map" } else { &map.name };
-    println!("{name}{}:", if prefix.is_empty() { String::new() } else { format!(" for {prefix}") });
     for point in &mapped.points {
         println!(
             "  {:<12} {:<44} {:>5.1} % of the frames",
@@ -231,6 +260,17 @@ mod tests {
         );
         fs::write(&path, "[points]\nhead = 3\n").unwrap();
         assert!(format!("{:#}", asked(&[path.to_str().unwrap()]).unwrap_err()).contains("line 2"));
+    }
+
+    #[test]
+    fn control_points_need_no_map() {
+        let names = |list: &[&str]| list.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>();
+        let standard = names(&["left_wrist", "right_wrist"]);
+        let said = as_they_are(&standard, &standard_names(&standard));
+        assert!(said.contains("can be used as it is") && said.contains("needs no --map"), "{said}");
+        let more = names(&["left_wrist", "LeftKnee", "right_wrist"]);
+        let said = as_they_are(&more, &standard_names(&more));
+        assert!(said.contains("(LeftKnee)") && said.ends_with("--points left_wrist,right_wrist"), "{said}");
     }
 
     #[test]
