@@ -196,8 +196,9 @@ fn one_camera_is_enough_and_none_too() -> Result<()> {
         "cameras is for runs that use cameras",
     )?;
     // what only the model knows ends the run, with words
-    let run = api.start_run(&session, &json!({ "inverse_kinematics": { "stature_m": 4.0 } }))?;
+    let run =
+        api.start_run(&session, &json!({ "inverse_kinematics": { "stature_m": 1.0, "mass_kg": 250 } }))?;
     let end = api.wait(&run)?;
-    ensure!(end["state"] == "failed" && end["error"].to_string().contains("stature"), "{end}");
+    ensure!(end["state"] == "failed" && end["error"].to_string().contains("such a body"), "{end}");
     Ok(())
 }

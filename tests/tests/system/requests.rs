@@ -144,8 +144,10 @@ fn a_request_is_one_of_its_kinds_and_every_example_is_accepted_as_printed() -> R
         // one that has to be asked for says so beside its fields
         let object = if schema["allOf"].is_array() { &schema["allOf"][0] } else { &schema };
         assert_eq!(object["additionalProperties"], false, "{schema}");
-        let [kind] = &object["properties"]["kind"]["enum"].as_array().context("no kind")?[..] else {
-            anyhow::bail!("several kinds: {schema}");
+        // it may be left out, which null stands for
+        let [kind, Value::Null] = &object["properties"]["kind"]["enum"].as_array().context("no kind")?[..]
+        else {
+            anyhow::bail!("not one kind or null: {schema}");
         };
         let example = &content["examples"][kind.as_str().unwrap_or_default()]["value"];
         assert_eq!((&example["kind"], &schema["examples"][0]), (kind, example));
@@ -276,7 +278,7 @@ fn a_body_that_nobody_has_is_refused_before_there_is_a_run() -> Result<()> {
         (json!({"age_years": 400}), "age of 400 years was asked for, expected 0 to 120"),
         (json!({"alpha": [0, 99]}), "alpha[1] is 99, expected -6 to 6 standard deviations"),
         (json!({"alpha": [0], "mass_kg": 70}), "alpha is given beside measurements"),
-        (json!({"alpha": vec![0; 100_000]}), "alpha has 100000 numbers, expected at most"),
+        (json!({"alpha": vec![0; 1000]}), "alpha has 1000 numbers, expected at most"),
     ] {
         let request = json!({"kind": "inverse-kinematics", "inverse_kinematics": options});
         let (status, detail) = ask(&api, &session, &request)?;
