@@ -74,12 +74,12 @@ fn a_worker_killed_in_the_middle_of_a_run_costs_nothing_but_time() -> Result<()>
     let mut victim = system.spawn(MAREY, "reconstruction", "victim")?;
     let expected = undisturbed(&api, &session, &request)?;
     // Killed between two jobs nothing is lost: then it is tried again.
-    for _ in 0..10 {
+    for trial in 0..10 {
         let run = api.start_run(&session, &request)?;
         let event = api.wait_until(&run, |event| event["progress"].as_f64() > Some(0.2))?;
         assert_eq!(event["state"], "running", "{event}");
         victim.kill()?;
-        victim = system.spawn(MAREY, "reconstruction", "successor")?;
+        victim = system.spawn(MAREY, "reconstruction", &format!("successor {trial}"))?;
         let end = api.wait(&run)?;
         assert_eq!(end["state"], "succeeded", "{end}");
         assert_same(&api.motion_files(&run)?, &expected);
