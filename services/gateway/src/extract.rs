@@ -6,9 +6,8 @@ use axum::{
     http::{Method, StatusCode, header, request::Parts},
 };
 use serde::de::DeserializeOwned;
-use uuid::Uuid;
 
-use crate::{App, error::Error, idempotency::RequestKey, json, query};
+use crate::{App, error::Error, idempotency::RequestKey, json, query, versioned};
 
 /// Largest JSON body, bytes.
 pub(crate) const MAX_JSON_BYTES: usize = 256 << 10;
@@ -35,7 +34,7 @@ async fn check_path(parts: &mut Parts, app: &App) -> Result<(), Error> {
         .await
         .map_err(|_| Error::NoSuchPath(parts.uri.path().to_owned()))?;
     for (key, value) in &named {
-        let is_no_id = key.ends_with("_id") && Uuid::try_parse(value).is_err();
+        let is_no_id = key.ends_with("_id") && versioned::as_id(value).is_none();
         // what an uploaded file may be called is said where it is received
         let has_nul = value.contains('\0') && !(key == "name" && parts.method == Method::PUT);
         if is_no_id || has_nul {

@@ -34,7 +34,11 @@ struct Row {
 impl RequestKey {
     /// Reads the header, if the request has it.
     pub fn read(headers: &HeaderMap, method: &Method, path: &str, body: &[u8]) -> Result<Self> {
-        let Some(value) = headers.get("idempotency-key") else { return Ok(Self(None)) };
+        let mut values = headers.get_all("idempotency-key").iter();
+        let Some(value) = values.next() else { return Ok(Self(None)) };
+        if values.next().is_some() {
+            return Err(Error::BadRequest("Idempotency-Key is given twice, expected once".into()));
+        }
         let key = value
             .to_str()
             .ok()

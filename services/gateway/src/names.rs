@@ -7,11 +7,16 @@ const MAX_NAME_CHARS: usize = 200;
 
 /// Checks the name of a session, or a tag: any text of one line.
 pub(crate) fn check_line(field: &str, text: &str) -> Result<()> {
+    let refuse = |what: String| Err(Error::Unprocessable(format!("{field} {what}")));
     let length = text.chars().count();
-    if length == 0 || length > MAX_NAME_CHARS || text.chars().any(char::is_control) {
-        return Err(Error::Unprocessable(format!(
-            "{field} has {length} characters, expected 1 to {MAX_NAME_CHARS} without control characters"
-        )));
+    if length == 0 || length > MAX_NAME_CHARS {
+        return refuse(format!("has {length} characters, expected 1 to {MAX_NAME_CHARS}"));
+    }
+    if let Some(c) = text.chars().find(|c| c.is_control()) {
+        return refuse(format!("has the control character {c:?}, expected a line of text"));
+    }
+    if text.trim().is_empty() {
+        return refuse("is blank, expected a line of text".into());
     }
     Ok(())
 }
@@ -19,7 +24,12 @@ pub(crate) fn check_line(field: &str, text: &str) -> Result<()> {
 /// Checks the name of a file: one path component, nothing hidden.
 pub(crate) fn check_file_name(name: &str) -> Result<()> {
     let length = name.chars().count();
-    let plain = !name.starts_with('.') && !name.chars().any(|c| c.is_control() || matches!(c, '/' | '\\'));
+    if let Some(c) = name.chars().find(|c| c.is_control()) {
+        return Err(Error::Unprocessable(format!(
+            "the file name has the control character {c:?}, expected a line of text"
+        )));
+    }
+    let plain = !name.starts_with('.') && !name.contains(['/', '\\']) && !name.trim().is_empty();
     if length == 0 || length > MAX_NAME_CHARS || !plain {
         return Err(Error::Unprocessable(format!(
             "{:?} is not a valid file name: expected 1 to {MAX_NAME_CHARS} characters without slashes that do not start \
@@ -71,7 +81,7 @@ mod tests {
 
     #[test]
     fn names_that_escape_or_hide_are_refused() {
-        for bad in ["", ".", "..", ".hidden", "a/b", "a\\b", "a\nb", &"x".repeat(201)] {
+        for bad in ["", ".", "..", ".hidden", "a/b", "a\\b", "a\nb", "  ", &"x".repeat(201)] {
             assert!(check_file_name(bad).is_err(), "{bad:?}");
         }
         check_file_name("Läufer 1.csv").unwrap();

@@ -272,13 +272,16 @@ fn a_body_that_nobody_has_is_refused_before_there_is_a_run() -> Result<()> {
     let api = system.project("p")?;
     let session = api.session("s", &[POINTS])?;
     for (options, expected) in [
-        (json!({"stature_m": 0}), "stature of 0 m was asked for, expected 1 to 2.4"),
-        (json!({"stature_m": 178}), "stature of 178 m was asked for, expected 1 to 2.4"),
-        (json!({"mass_kg": -70}), "mass of -70 kg was asked for, expected 20 to 250"),
-        (json!({"age_years": 400}), "age of 400 years was asked for, expected 0 to 120"),
-        (json!({"alpha": [0, 99]}), "alpha[1] is 99, expected -6 to 6 standard deviations"),
-        (json!({"alpha": [0], "mass_kg": 70}), "alpha is given beside measurements"),
-        (json!({"alpha": vec![0; 1000]}), "alpha has 1000 numbers, expected at most"),
+        (json!({"stature_m": 0}), "inverse_kinematics: stature of 0 m was asked for, expected 1 to 2.4"),
+        (json!({"stature_m": 178}), "inverse_kinematics: stature of 178 m was asked for, expected 1 to 2.4"),
+        (json!({"mass_kg": -70}), "inverse_kinematics: mass of -70 kg was asked for, expected 20 to 250"),
+        (json!({"age_years": 400}), "inverse_kinematics: age of 400 years was asked for, expected 0 to 120"),
+        (
+            json!({"alpha": [0, 99]}),
+            "inverse_kinematics.alpha[1] is 99, expected -6 to 6 standard deviations",
+        ),
+        (json!({"alpha": [0], "mass_kg": 70}), "inverse_kinematics.alpha is given beside measurements"),
+        (json!({"alpha": vec![0; 1000]}), "inverse_kinematics.alpha has 1000 numbers, expected at most"),
     ] {
         let request = json!({"kind": "inverse-kinematics", "inverse_kinematics": options});
         let (status, detail) = ask(&api, &session, &request)?;

@@ -57,6 +57,10 @@ impl CameraFields {
                 self.camera_files.len()
             )));
         }
+        let mut names = self.cameras.iter().enumerate();
+        if let Some((_, name)) = names.find(|(place, name)| self.cameras[..*place].contains(name)) {
+            return Err(Error::Unprocessable(format!("cameras has {name:?} twice, expected each once")));
+        }
         check_unit("metres_per_unit", self.metres_per_unit)?;
         self.resolve().map(drop)
     }
@@ -93,6 +97,7 @@ impl CameraFields {
         inverse_kinematics: Option<InverseKinematics>,
     ) -> Result<PlanMultiView> {
         check_files(&on.files)?;
+        check_named_files(&self.camera_files, &on.files)?;
         let parameters = self.resolve()?;
         Ok(PlanMultiView {
             inputs: on.inputs(up),
@@ -115,6 +120,20 @@ pub(super) async fn body_model(
     which: Option<&str>,
 ) -> Result<BodyModel> {
     versioned::find(db, project_id, which.unwrap_or(SHIPPED), Latest::Ready, Lock::Share).await
+}
+
+/// Refuses a name that no file of the session has. What is in an archive is seen when that is read.
+fn check_named_files(named: &BTreeMap<String, String>, files: &[InputFile]) -> Result<()> {
+    let is_there = |name: &str| {
+        let archive = name.split_once('/').map_or(name, |(archive, _)| archive);
+        files.iter().any(|file| file.name == archive)
+    };
+    match named.keys().find(|name| !is_there(name)) {
+        None => Ok(()),
+        Some(name) => Err(Error::Unprocessable(format!(
+            "camera_files names {name:?}, expected a file of the session, or ARCHIVE/FOLDER"
+        ))),
+    }
 }
 
 /// Refuses a session without a calibration, or without anything that cameras saw.

@@ -150,10 +150,10 @@ impl InverseKinematicsRequest {
         let refuse = |what: String| Err(Error::Unprocessable(what));
         self.solver()?;
         if let Some(steps) = self.steps.filter(|steps| !(1..=STEPS.0).contains(steps)) {
-            return refuse(format!("steps is {steps}, expected 1 to {}", STEPS.0));
+            return refuse(format!("inverse_kinematics.steps is {steps}, expected 1 to {}", STEPS.0));
         }
         if let Some(rate) = self.frame_rate.filter(|rate| !FRAME_RATES.contains(rate)) {
-            return refuse(format!("frame_rate is {rate}, expected 1 to 1000"));
+            return refuse(format!("inverse_kinematics.frame_rate is {rate}, expected 1 to 1000"));
         }
         self.check_body()
     }
@@ -163,35 +163,37 @@ impl InverseKinematicsRequest {
         let refuse = |what: String| Err(Error::Unprocessable(what));
         let (stature_m, mass_kg, age_years) = (self.stature_m, self.mass_kg, self.age_years);
         let wanted = Wanted { stature_m, mass_kg, age_years, sex: self.sex()? };
-        wanted.check().map_err(|error| Error::Unprocessable(error.to_string()))?;
+        wanted.check().map_err(|error| Error::Unprocessable(format!("inverse_kinematics: {error}")))?;
         if self.alpha.is_empty() {
             return Ok(());
         }
         if wanted != Wanted::default() {
-            return refuse("alpha is given beside measurements, expected one of the two".into());
+            return refuse(
+                "inverse_kinematics.alpha is given beside measurements, expected one of the two".into(),
+            );
         }
         if self.alpha.len() > body::MAX_COMPONENTS {
             let (found, most) = (self.alpha.len(), body::MAX_COMPONENTS);
-            return refuse(format!("alpha has {found} numbers, expected at most {most}"));
+            return refuse(format!("inverse_kinematics.alpha has {found} numbers, expected at most {most}"));
         }
         match self.alpha.iter().enumerate().find(|(_, a)| a.abs() > MAX_DEVIATIONS) {
             None => Ok(()),
             Some((number, a)) => refuse(format!(
-                "alpha[{number}] is {a}, expected -{MAX_DEVIATIONS} to {MAX_DEVIATIONS} standard deviations"
+                "inverse_kinematics.alpha[{number}] is {a}, expected -{MAX_DEVIATIONS} to {MAX_DEVIATIONS} standard deviations"
             )),
         }
     }
 
     fn sex(&self) -> Result<Option<Sex>> {
         let sex = self.sex.as_deref().map(str::parse).transpose();
-        sex.map_err(|error: UnknownSex| Error::Unprocessable(error.to_string()))
+        sex.map_err(|error: UnknownSex| Error::Unprocessable(format!("inverse_kinematics.{error}")))
     }
 
     fn solver(&self) -> Result<Option<Method>> {
         let Some(name) = &self.solver else { return Ok(None) };
         serde_json::from_value(name.as_str().into()).map(Some).map_err(|_| {
             Error::Unprocessable(format!(
-                "solver is {name:?}, expected plain, priority, image-constrained, extended, image-first or \
+                "inverse_kinematics.solver is {name:?}, expected plain, priority, image-constrained, extended, image-first or \
                  reach-then-image-then-posture"
             ))
         })

@@ -123,7 +123,7 @@ impl SparseRun {
             ("window", self.window.map(Value::from)),
             ("neighbours", self.neighbours.map(Value::from)),
         ];
-        for (name, value) in named {
+        for (name, value) in named.clone() {
             if let Some(value) = value
                 && given.insert(name.into(), value).is_some()
             {
@@ -132,7 +132,18 @@ impl SparseRun {
                 )));
             }
         }
-        resolve_parameters(given, has_own_skeleton)
+        resolve_parameters(given, has_own_skeleton).map_err(|error| match error {
+            // what was given as a field is not called a parameter
+            Error::Unprocessable(what) => {
+                let plain = what.strip_prefix("parameters.").unwrap_or(&what);
+                let is_field = named.iter().any(|(name, value)| {
+                    let rest = plain.strip_prefix(name);
+                    value.is_some() && rest.is_some_and(|rest| rest.starts_with(' '))
+                });
+                Error::Unprocessable(if is_field { plain.to_owned() } else { what })
+            }
+            error => error,
+        })
     }
 }
 
@@ -142,7 +153,7 @@ pub(crate) fn resolve_parameters(
     mut given: Map<String, Value>,
     has_own_skeleton: bool,
 ) -> Result<Parameters> {
-    let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
+    let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters.{error}"));
     if !has_own_skeleton {
         for name in ["skeleton_weight", "start_skeleton_weight"] {
             given.entry(name).or_insert(Value::from(0.0));

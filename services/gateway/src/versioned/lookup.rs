@@ -31,15 +31,15 @@ pub(crate) async fn find<V: Versioned>(
         return Ok(shipped);
     }
     let not_found = || Error::not_found(V::NOUN.name, which);
-    let id = match (Uuid::try_parse(which), which.rsplit_once('@')) {
-        (Ok(id), _) => Some(id),
-        (Err(_), Some((name, version))) => {
-            let version: i32 = version.parse().map_err(|_| not_found())?;
+    let id = match (as_id(which), which.rsplit_once('@')) {
+        (Some(id), _) => Some(id),
+        (None, Some((name, version))) => {
+            let version = as_version(version).ok_or_else(not_found)?;
             let query =
                 sqlx::query_scalar(V::NOUN.sql.find_version).bind(project_id).bind(name).bind(version);
             query.fetch_optional(&mut *db).await?
         }
-        (Err(_), None) => {
+        (None, None) => {
             let is_ready_wanted = latest == Latest::Ready;
             let query = sqlx::query_scalar(V::NOUN.sql.find_latest);
             query.bind(project_id).bind(which).bind(is_ready_wanted).fetch_optional(&mut *db).await?
@@ -51,6 +51,16 @@ pub(crate) async fn find<V: Versioned>(
         Lock::Update => V::NOUN.sql.find_for_update,
     };
     sqlx::query_as(query).bind(id).bind(project_id).fetch_optional(db).await?.ok_or_else(not_found)
+}
+
+/// An id as it is given out: other ways to write one are not taken, so that a thing has one address.
+pub(crate) fn as_id(text: &str) -> Option<Uuid> {
+    Uuid::try_parse(text).ok().filter(|id| id.as_hyphenated().to_string().eq_ignore_ascii_case(text))
+}
+
+/// A version as it is given out: no sign, no leading zero.
+fn as_version(text: &str) -> Option<i32> {
+    text.parse().ok().filter(|version: &i32| version.to_string() == text)
 }
 
 /// The same for a caller who only looks.
