@@ -90,6 +90,23 @@ pub enum InputError {
         /// What would do.
         expected: &'static str,
     },
+    /// Points too far apart to be on one body.
+    #[error(
+        "measured points are too far apart in half of the frames: {first} and {second} {width_m:.1} m, where the body has a \
+         stature of {stature_m:.2} m: expected positions in metres (they are probably {unit})"
+    )]
+    Unit {
+        /// One of the two points that are farthest apart.
+        first: String,
+        /// The other.
+        second: String,
+        /// Median over the frames of the widest distance, metres.
+        width_m: f64,
+        /// Stature of the body, metres.
+        stature_m: f64,
+        /// `in` and the unit that the file probably has.
+        unit: String,
+    },
     /// What cameras saw in a frame of a request can't be read.
     #[error("frame {frame}: {source}")]
     Frame {

@@ -20,7 +20,7 @@ use super::{
     MAX_STEPS,
     evidence::{self, Frames},
     finished::Finished,
-    outliers::{self, Outlier},
+    outliers::{self, Outlier, Reach},
     report,
 };
 use crate::{InputError, Shared, plan_job};
@@ -165,13 +165,22 @@ impl IkHandler {
             }
             let figure = Figure::body(&model, &shape, &chosen.points)?;
             let mut measured = evidence::resampled(&chosen.trajectories, &chosen.points, frames);
-            let out = outliers::remove(&mut measured, shape.measurements(&model).stature_m);
+            let reach = Reach::new(&skeleton, &chosen.points, shape.measurements(&model).stature_m);
+            let out = outliers::remove(&mut measured, &reach);
+            outliers::check_unit(&measured, &reach, &chosen.points)?;
             if let Some(Outlier { frame, point }) = out.first() {
                 warnings.push(format!(
                     "{} samples of measured points are farther from the others than a body reaches and are taken as not measured; \
                      the first: {} in frame {frame}",
                     out.len(),
                     chosen.points[*point].name
+                ));
+            }
+            if let Some((frame, way_m)) = outliers::jump(&measured, rate) {
+                warnings.push(format!(
+                    "all measured points move {way_m:.1} m from frame {} to frame {frame}, faster than anybody can: the \
+                     recording may have been cut there, or its origin moved",
+                    frame - 1
                 ));
             }
             if measured.iter().flatten().all(|position| position.x.is_nan()) {
