@@ -86,6 +86,7 @@ impl Request for SolveInverseKinematics {
         let cameras = self.cameras.as_ref();
         json!({
             "up": self.inputs.up,
+            "points": self.how.choice,
             "cameras": cameras.map(|planned| &planned.choice),
             "silhouettes": cameras.and_then(|planned| planned.parameters.as_ref()),
         })
@@ -111,4 +112,23 @@ pub struct CamerasPlanned {
     pub warnings: Vec<String>,
     /// What the plan itself took.
     pub plan: JobReport,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_choice_of_points_is_said_where_sparse_runs_say_it() {
+        let request: SolveInverseKinematics = serde_json::from_value(json!({
+            "session_id": uuid::Uuid::nil(), "files": [],
+            "body_model": { "id": uuid::Uuid::nil(), "name": "shipped", "version": 1, "store_key": "", "blake3": "" },
+            "how": { "solver": "plain", "steps": 15, "points": ["head"], "marker_set": "none" },
+        }))
+        .unwrap();
+        let reading = request.reading();
+        assert_eq!(reading["points"]["points"], json!(["head"]));
+        assert_eq!(reading["points"]["marker_set"], "none");
+        assert_eq!(request.parameters().unwrap()["points"], json!(["head"]));
+    }
 }
