@@ -13,7 +13,7 @@ use crate::{
 /// What a file of points may not say.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointsOptions {
-    /// the axis of the file that points up; by default what the file says, else Y for TRC and Z for C3D
+    /// the axis of the file that points up; by default what the file says, else Y for CSV and TRC and Z for C3D
     pub up: Option<Axis>,
     /// standard deviation of a sample of full confidence, metres (default 0.0015): what a confidence divides, and the
     /// least residual that is taken for a standard deviation
@@ -36,6 +36,15 @@ pub(crate) fn y_up(up: Axis, p: Vector3<f64>) -> Vector3<f64> {
         Axis::X => Vector3::new(p.z, p.x, p.y),
         Axis::Y => p,
         Axis::Z => Vector3::new(p.x, p.z, -p.y),
+    }
+}
+
+/// The axis as messages call it.
+pub(crate) fn letter(axis: Axis) -> char {
+    match axis {
+        Axis::X => 'x',
+        Axis::Y => 'y',
+        Axis::Z => 'z',
     }
 }
 

@@ -1,12 +1,12 @@
 //! CSV of point trajectories: `time,left_wrist_x,left_wrist_y,left_wrist_z,…`.
 //!
-//! Seconds and metres, y up; an empty cell or `nan` was not measured; lines that start with `#` are comments.
+//! Seconds and metres, y up unless the options say otherwise; an empty cell or `nan` was not measured; lines that start with `#` are comments.
 //! Columns may come in any order; a column `frame` is skipped. How sure a sample is may be said in `left_wrist_sigma`
 //! (standard deviation of each coordinate, metres) or `left_wrist_confidence` (0 to 1).
 
 use std::collections::HashMap;
 
-use model::PointTrajectories;
+use model::{Axis, PointTrajectories};
 use nalgebra::Vector3;
 
 use crate::{
@@ -46,7 +46,7 @@ pub fn read(bytes: &[u8]) -> Result<Read<PointTrajectories>> {
 /// Reads point trajectories. The frame rate is that of the times; frames without a row are missing.
 ///
 /// A confidence divides the standard deviation: that of the sample if the file says it, else that of the options. At 0
-/// the sample was not measured.
+/// the sample was not measured. Points are turned so that the options' `up`, else y, points up.
 ///
 /// # Errors
 /// If the header lacks the time or a coordinate of a point, a row has another number of cells than the header, a
@@ -60,6 +60,12 @@ pub fn read_with(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTraj
     };
     let separator = separator(header.text);
     let (columns, names) = columns(header, separator, &mut warnings)?;
+    let up = options.up.unwrap_or(Axis::Y);
+    if let Some(line) = line_that_contradicts(bytes, up) {
+        let message =
+            format!("says y up; it is turned from {} up all the same, as asked for", points::letter(up));
+        warnings.add(Place::Line(line), message);
+    }
     let max_frames = points::max_frames(bytes.len(), names.len());
     let mut times = Times::default();
     let mut positions = Vec::new();
@@ -103,9 +109,19 @@ pub fn read_with(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTraj
             format!("{} with only one or two coordinates taken as missing", counted(not_whole, "sample"));
         warnings.add(Place::File, message);
     }
+    for position in &mut positions {
+        *position = points::y_up(up, *position);
+    }
     let grid = times.grid(None, max_frames, &mut warnings)?;
     let trajectories = points::place(names, &positions, &sigmas, &grid)?;
     Ok(warnings.beside(trajectories))
+}
+
+/// The comment above the header that says y up, as in files that this module wrote, where another axis is asked for.
+fn line_that_contradicts(bytes: &[u8], up: Axis) -> Option<usize> {
+    let mut comments = Lines::new(bytes).take_while(|line| line.text.starts_with(b"#"));
+    let says_y_up = |line: &Line<'_>| line.text.to_ascii_lowercase().windows(4).any(|part| part == b"y up");
+    comments.find(says_y_up).filter(|_| up != Axis::Y).map(|line| line.number)
 }
 
 /// Spreadsheets of some countries write semicolons.

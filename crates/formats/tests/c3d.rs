@@ -191,6 +191,17 @@ impl Made {
 }
 
 #[test]
+fn another_axis_than_the_file_says_is_used_with_a_warning() {
+    let bytes = Made::new(84, -1.0).bytes();
+    let read = |up| c3d::read(&bytes, &PointsOptions { up, ..PointsOptions::default() }).unwrap();
+    assert_eq!(read(Some(Axis::Z)).warnings, []);
+    let turned = read(Some(Axis::Y));
+    let warning = turned.warnings[0].to_string();
+    assert!(warning.contains("says that z is up; the points are turned from y up all the same"), "{warning}");
+    assert_ne!(turned.value.frame(0)[0], read(None).value.frame(0)[0]);
+}
+
+#[test]
 fn all_processors_and_both_kinds_of_data_are_read_alike() {
     for processor in [84, 85, 86] {
         for scale in [-1.0, 0.5] {

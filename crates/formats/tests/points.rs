@@ -4,6 +4,7 @@ use std::path::Path;
 
 use formats::{PointsOptions, points_csv, trc};
 use model::{Axis, PointTrajectories};
+use nalgebra::Vector3;
 
 const MARKERS: &str = "data/markers";
 
@@ -104,6 +105,26 @@ const CSV: &str = "time,hand_x,hand_y,hand_z,foot_x,foot_y,foot_z
 
 fn csv(text: &str) -> PointTrajectories {
     points_csv::read(text.as_bytes()).unwrap().value
+}
+
+#[test]
+fn a_csv_is_turned_from_the_axis_that_is_said_to_be_up() {
+    let options = |up| PointsOptions { up, ..PointsOptions::default() };
+    for (up, expected) in
+        [(None, [1.0, 2.0, 3.0]), (Some(Axis::Z), [1.0, 3.0, -2.0]), (Some(Axis::X), [3.0, 1.0, 2.0])]
+    {
+        let read = points_csv::read_with(CSV.as_bytes(), &options(up)).unwrap();
+        assert_eq!(read.value.frame(0)[0], Vector3::from(expected), "{up:?}");
+        assert!(read.warnings.is_empty());
+    }
+    let written = points_csv::write(&csv(CSV));
+    let read = points_csv::read_with(written.as_bytes(), &options(Some(Axis::Z))).unwrap();
+    assert_eq!(read.value.frame(0)[0], Vector3::new(1.0, 3.0, -2.0));
+    assert_eq!(
+        read.warnings[0].to_string(),
+        "line 1: says y up; it is turned from z up all the same, as asked for"
+    );
+    assert!(points_csv::read_with(written.as_bytes(), &options(Some(Axis::Y))).unwrap().warnings.is_empty());
 }
 
 fn csv_error(text: &str) -> String {

@@ -40,7 +40,19 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
     let unit = parameters.get("POINT", "UNITS").and_then(|p| p.texts().next()).unwrap_or_default();
     let metres = points::metres_or_mm(unit, place("UNITS"), &mut warnings)?;
     let up = match options.up {
-        Some(up) => up,
+        Some(up) => {
+            // what the screen's axis is worth is no matter here, unless it is another
+            let stated = up_of_screen(&parameters, &mut Warnings::default());
+            if let Some(stated) = stated.ok().filter(|stated| is_stated(&parameters) && *stated != up) {
+                let message = format!(
+                    "POINT:Y_SCREEN says that {} is up; the points are turned from {} up all the same, as asked for",
+                    points::letter(stated),
+                    points::letter(up)
+                );
+                warnings.add(place("Y_SCREEN"), message);
+            }
+            up
+        }
         None => up_of_screen(&parameters, &mut warnings)?,
     };
     let mut at_origin = 0;
@@ -68,6 +80,11 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
     let names = names(&parameters, header.points, &mut warnings);
     let trajectories = PointTrajectories::new(names, header.rate, positions)?.with_sigmas(sigmas)?;
     Ok(warnings.beside(trajectories))
+}
+
+/// Whether `POINT:Y_SCREEN` says anything.
+fn is_stated(parameters: &Parameters<'_>) -> bool {
+    parameters.get("POINT", "Y_SCREEN").and_then(|p| p.texts().next()).is_some_and(|text| !text.is_empty())
 }
 
 fn up_of_screen(parameters: &Parameters<'_>, warnings: &mut Warnings) -> Result<Axis> {
