@@ -70,7 +70,14 @@ pub(crate) fn choose(
         Markers::Auto if has_control_points(names, skeleton) => {
             return as_named(file, trajectories, wanted, skeleton, warnings);
         }
-        Markers::Auto => (detected(file, names, warnings).map_err(in_file)?, false),
+        Markers::Auto => {
+            let found = detected(file, names, warnings);
+            (
+                found
+                    .map_err(|source| one_point(file, names, skeleton).unwrap_or_else(|| in_file(source)))?,
+                false,
+            )
+        }
         Markers::Pairs(pairs) => (from_pairs(pairs, names, wanted, file)?, true),
         Markers::Preset(map) => (map.clone(), false),
         Markers::Map(map) => (map.clone(), true),
@@ -117,6 +124,17 @@ fn has_control_points(names: &[String], skeleton: &Skeleton) -> bool {
     names.iter().filter(|name| control_points(skeleton, &[name]).is_ok()).count() >= 2
 }
 
+/// What is wrong with a file that has one control point under its own name, where it has no marker set either.
+fn one_point(file: &str, names: &[String], skeleton: &Skeleton) -> Option<InputError> {
+    let point = names.iter().find(|name| control_points(skeleton, &[name]).is_ok())?;
+    let others = match names.len() - 1 {
+        0 => String::new(),
+        1 => " and a trajectory of another name".to_owned(),
+        others => format!(" and {others} trajectories of other names"),
+    };
+    Some(InputError::OnePoint { file: file.to_owned(), point: point.clone(), others })
+}
+
 fn detected(file: &str, names: &[String], warnings: &mut Vec<String>) -> markers::Result<MarkerMap> {
     let fit = markers::detect(names)?;
     warnings.push(format!(
@@ -155,4 +173,32 @@ fn from_pairs(
         wanted.iter().filter(|name| names.contains(name) && !pairs.values().any(|point| point == *name));
     let own = own.map(|name| (name.as_str(), name.as_str()));
     Ok(MarkerMap::from_pairs(markers.into_iter().chain(own)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_control_point_is_called_so() {
+        let model = body::BodyModel::shipped();
+        let skeleton = model.skeleton(&model.shape(&[])).unwrap();
+        let error = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+            let nothing = vec![Vector3::zeros(); 2 * names.len()];
+            let trajectories = PointTrajectories::new(names, 60.0, nothing).unwrap();
+            let chosen = choose("a.csv", trajectories, &Markers::Auto, &[], &skeleton, &mut Vec::new());
+            chosen.err().unwrap().to_string()
+        };
+        assert_eq!(
+            error(&["left_wrist"]),
+            "a.csv has 1 control point (left_wrist), expected 2 to 16 (a marker map may make them: --map FILE)"
+        );
+        let two = error(&["tail", "left_wrist"]);
+        assert!(
+            two.contains("1 control point (left_wrist) and a trajectory of another name, expected"),
+            "{two}"
+        );
+        assert!(error(&["tail"]).contains("match no known marker set"));
+    }
 }

@@ -66,6 +66,18 @@ pub enum InputError {
     /// A name stands for no point of the skeleton.
     #[error(transparent)]
     Points(#[from] kinematics::Error),
+    /// A file with one control point.
+    #[error(
+        "{file} has 1 control point ({point}){others}, expected 2 to 16 (a marker map may make them: --map FILE)"
+    )]
+    OnePoint {
+        /// Name of the file.
+        file: String,
+        /// The point.
+        point: String,
+        /// ` and` what else the file has, if anything.
+        others: String,
+    },
     /// More points than a figure may have.
     #[error(
         "{file} has {found} points of the body, of which at most {limit} can be used; choose some: --points {some}"
