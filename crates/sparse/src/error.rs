@@ -45,6 +45,23 @@ pub enum Error {
         /// leg length of the skeleton, metres
         leg_m: f64,
     },
+    /// Coordinates of another system, such as a map's.
+    #[error(
+        "{count} of {measured} measured samples are more than 100 km from the origin (the first: {point} in frame {frame} at \
+         {x:.0} {y:.0} {z:.0} m): expected metres from an origin near the capture", x = position[0], y = position[1], z = position[2]
+    )]
+    FarFromOrigin {
+        /// samples that far away
+        count: usize,
+        /// samples that were measured
+        measured: usize,
+        /// point of the first of them
+        point: String,
+        /// frame of the first of them
+        frame: usize,
+        /// where it is, metres
+        position: [f64; 3],
+    },
     /// Not enough was measured to begin with.
     #[error(
         "session has {frames} frames with fewer than two measured control points in each, expected a frame with at least two"

@@ -41,7 +41,7 @@ pub use parameters::{Covariance, Method, Parameters, Search};
 pub use problem::control_table;
 pub use reconstruct::Reconstructor;
 pub use reconstruction::{FrameQuality, Reconstruction};
-pub use session::Session;
+pub use session::{FarSamples, Session};
 pub use training::train_gplvm;
 
 /// Result of the fallible functions of this crate.

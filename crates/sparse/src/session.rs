@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::{fmt, sync::Arc};
 
 use kinematics::ControlPoint;
 use model::{PointTrajectories, Skeleton, SkeletonRecord};
@@ -14,6 +14,8 @@ const FRAME_RATE: f64 = motion_db::FRAME_RATE;
 const MAX_POINTS: usize = 16;
 /// What is said to be farther from the origin than this (metres, in any direction) was not measured.
 const MAX_DISTANCE: f64 = 1e5;
+/// Where a larger share of the samples is that far away, their origin is elsewhere.
+const MOST_FAR: f64 = 0.5;
 const MAGIC: &[u8; 8] = b"MAREYSE2";
 
 /// A sparse capture session: the performer's skeleton and what was measured of them, at 60 frames a second.
@@ -25,6 +27,67 @@ pub struct Session {
     pub points: Vec<ControlPoint>,
     /// one trajectory for each of `points`, in their order, 60 frames a second, metres, y up
     pub trajectories: PointTrajectories,
+}
+
+/// Samples more than 100 km from the origin: they count as not measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FarSamples {
+    /// how many
+    pub count: usize,
+    /// samples that were measured, these among them
+    pub measured: usize,
+    /// point of the first of them
+    pub point: String,
+    /// frame of the first of them, in the frames of the trajectories
+    pub frame: usize,
+    /// where that is, metres
+    pub position: [f64; 3],
+}
+
+impl FarSamples {
+    /// Those of `points`, if there are any.
+    ///
+    /// # Errors
+    /// If they are most of what was measured.
+    pub fn find(trajectories: &PointTrajectories, points: &[ControlPoint]) -> Result<Option<Self>> {
+        let columns: Vec<usize> =
+            points.iter().filter_map(|point| trajectories.point_index(&point.name)).collect();
+        let mut measured = 0;
+        let mut found: Option<Self> = None;
+        for frame in 0..trajectories.num_frames() {
+            let row = trajectories.frame(frame);
+            for (&column, position) in columns.iter().map(|column| (column, &row[*column])) {
+                measured += usize::from(position.iter().all(|v| v.is_finite()));
+                if position.amax() > MAX_DISTANCE {
+                    let first = found.get_or_insert_with(|| Self {
+                        count: 0,
+                        measured: 0,
+                        point: trajectories.names()[column].clone(),
+                        frame,
+                        position: (*position).into(),
+                    });
+                    first.count += 1;
+                }
+            }
+        }
+        let Some(found) = found.map(|found| Self { measured, ..found }) else { return Ok(None) };
+        if found.count as f64 > MOST_FAR * measured as f64 {
+            let Self { count, measured, point, frame, position } = found;
+            return Err(Error::FarFromOrigin { count, measured, point, frame, position });
+        }
+        Ok(Some(found))
+    }
+}
+
+impl fmt::Display for FarSamples {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { count, measured, point, frame, .. } = self;
+        write!(
+            f,
+            "{count} of {measured} measured samples are more than 100 km from the origin and are taken as not measured; the \
+             first: {point} in frame {frame}"
+        )
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -49,7 +112,8 @@ impl Session {
     /// measured.
     ///
     /// # Errors
-    /// If a point has no trajectory, there are fewer than 2 or more than 16 points, or no frame has two measured ones.
+    /// If a point has no trajectory, there are fewer than 2 or more than 16 points, most samples are more than 100 km away, or
+    /// no frame has two measured ones.
     pub fn new(
         skeleton: Arc<Skeleton>,
         points: Vec<ControlPoint>,
@@ -63,6 +127,7 @@ impl Session {
             })
         });
         let columns = columns.collect::<Result<Vec<_>>>()?;
+        FarSamples::find(trajectories, &points)?;
         let (mut positions, sigmas) = resample(trajectories, &columns);
         forget_absurd(&mut positions);
         let names = points.iter().map(|p| p.name.clone()).collect();
@@ -215,5 +280,36 @@ fn between(a: Option<f64>, b: Option<f64>, share: f64) -> f64 {
     match (a, b) {
         (Some(a), Some(b)) => a + (b - a) * share,
         (known, other) => known.or(other).unwrap_or(f64::NAN),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two points in ten frames, some of them so far along x.
+    fn far(count: usize, x: f64) -> (PointTrajectories, Vec<ControlPoint>) {
+        let names = ["head", "root"].map(str::to_owned);
+        let point = |name: &String| ControlPoint { name: name.clone(), joint: 0, offset: Vector3::zeros() };
+        let at =
+            |sample: usize| Vector3::new(if sample < 4 + count && sample >= 4 { x } else { 0.0 }, 1.0, 0.0);
+        let trajectories = PointTrajectories::new(names.to_vec(), 60.0, (0..20).map(at).collect()).unwrap();
+        (trajectories, names.iter().map(point).collect())
+    }
+
+    #[test]
+    fn samples_of_another_origin_are_counted_and_most_of_them_refused() {
+        let (trajectories, points) = far(0, 5e5);
+        assert_eq!(FarSamples::find(&trajectories, &points).unwrap(), None);
+        let (trajectories, points) = far(3, 5e5);
+        let found = FarSamples::find(&trajectories, &points).unwrap().unwrap();
+        assert_eq!((found.count, found.measured, found.frame, found.point.as_str()), (3, 20, 2, "head"));
+        let (trajectories, points) = far(16, 5e5);
+        let error = FarSamples::find(&trajectories, &points).unwrap_err().to_string();
+        assert!(
+            error.starts_with("16 of 20 measured samples are more than 100 km from the origin"),
+            "{error}"
+        );
+        assert!(error.contains("head in frame 2 at 500000 1 0 m"), "{error}");
     }
 }

@@ -11,7 +11,7 @@ use formats::{
 };
 use model::{Motion, PointTrajectories, Skeleton};
 use service::FileError;
-use sparse::Session;
+use sparse::{FarSamples, Session};
 use std::sync::Arc;
 
 /// A file's content.
@@ -79,6 +79,8 @@ pub(crate) fn read(
     let (file, trajectories) = measured_points(files, selection.reading, &mut warnings)?;
     let Selection { points, markers, .. } = *selection;
     let chosen = control::choose(&file, trajectories, markers, points, &skeleton, &mut warnings)?;
+    let far = FarSamples::find(&chosen.trajectories, &chosen.points)?;
+    warnings.extend(far.map(|far| format!("{file}: {far}")));
     let session = Session::new(skeleton, chosen.points, &chosen.trajectories)?;
     if let Some(truth) = ground_truth(files, fallback, selection.reading, session.num_frames() as f64 / 60.0)?
     {
@@ -173,4 +175,40 @@ fn at_most_one(files: &[NamedBytes], role: FileRole) -> Result<Option<&NamedByte
 
 fn kind_error(file: &NamedBytes) -> InputError {
     InputError::Kind { file: file.name.clone(), role: file.role }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is read of two points, of which one is at `x` in one frame of four.
+    fn read_with(x: &str, everywhere: bool) -> Result<Evidence, InputError> {
+        let mut text = "time,head_x,head_y,head_z,root_x,root_y,root_z\n".to_owned();
+        for frame in 0..4 {
+            let x = if frame == 2 || everywhere { x } else { "0" };
+            let root_x = if everywhere { x } else { "0" };
+            text.push_str(&format!("{},{x},1.6,0,{root_x},1,0\n", f64::from(frame) / 60.0));
+        }
+        let (name, role) = ("walk.csv".to_owned(), FileRole::ControlPoints);
+        let files = [NamedBytes { name, role, bytes: text.into() }];
+        let model = body::BodyModel::shipped();
+        let skeleton = model.skeleton(&model.shape(&[])).unwrap();
+        let selection =
+            Selection { points: &[], markers: &Markers::Auto, reading: session::Options::default() };
+        read(&files, &selection, &Arc::new(skeleton))
+    }
+
+    #[test]
+    fn samples_far_from_the_origin_are_warned_of_or_refused() {
+        assert_eq!(read_with("0", false).unwrap().warnings, [""; 0]);
+        let warnings = read_with("500000", false).unwrap().warnings;
+        assert!(
+            warnings[0].starts_with("walk.csv: 1 of 8 measured samples are more than 100 km from the origin")
+                && warnings[0].ends_with("the first: head in frame 2"),
+            "{warnings:?}"
+        );
+        let error = read_with("500000", true).unwrap_err().to_string();
+        assert!(error.contains("8 of 8 measured samples are more than 100 km from the origin"), "{error}");
+        assert!(error.contains("expected metres from an origin near the capture"), "{error}");
+    }
 }

@@ -5,6 +5,7 @@ use jobs::inverse_kinematics::InverseKinematics;
 use kinematics::{ControlPoint, control_points};
 use model::{Axis, PointTrajectories, Skeleton};
 use nalgebra::Vector3;
+use sparse::FarSamples;
 
 use super::MAX_POINTS;
 use crate::{
@@ -48,6 +49,8 @@ pub(super) fn read(
         }
     }
     let chosen = control::choose(&file, trajectories, &markers, &wanted, skeleton, warnings)?;
+    // single ones are warned of with the other samples that can't be
+    FarSamples::find(&chosen.trajectories, &chosen.points)?;
     if chosen.points.len() > MAX_POINTS {
         let some: Vec<&str> =
             chosen.points.iter().take(MAX_POINTS).map(|point| point.name.as_str()).collect();
