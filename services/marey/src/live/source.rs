@@ -3,6 +3,7 @@
 use std::{io::BufRead, path::Path, time::Instant};
 
 use anyhow::{Context, ensure};
+use client::numbers::shown;
 use formats::session::{self, Options};
 use model::{PointTrajectories, Samples};
 use nalgebra::Vector3;
@@ -235,7 +236,11 @@ impl Columns {
         let sigma = |at: &Option<usize>| {
             let found = at.map_or(Ok(f64::NAN), number)?;
             let is_sensible = found.is_nan() || found > 0.0 && found.is_finite();
-            ensure!(is_sensible, "a standard deviation is {found}, expected one above 0 m or an empty cell");
+            ensure!(
+                is_sensible,
+                "a standard deviation is {}, expected one above 0 m or an empty cell",
+                shown(found)
+            );
             Ok(found)
         };
         let sigmas = self.sigma.iter().map(sigma).collect::<anyhow::Result<_>>()?;
