@@ -6,7 +6,7 @@ use serde_json::{Map, Value, map::Entry};
 /// What options of a form such as `NAME=VALUE` say.
 ///
 /// # Errors
-/// If one is not of the form, or two have the same name.
+/// If one is not of the form, has nothing before or after the sign, or two have the same name.
 pub fn pairs(
     given: &[String],
     form: &str,
@@ -17,6 +17,10 @@ pub fn pairs(
         let (name, text) =
             pair.split_once('=').with_context(|| format!("{pair:?} is not of the form {form}"))?;
         let (name, text) = (name.trim(), text.trim());
+        if name.is_empty() || text.is_empty() {
+            let side = if name.is_empty() { "before" } else { "after" };
+            bail!("{pair:?} has nothing {side} the =, expected {form}");
+        }
         match said.entry(name) {
             Entry::Vacant(entry) => entry.insert(value(text)),
             Entry::Occupied(_) => bail!("{name:?} is given twice, expected one {form} for it"),
@@ -46,6 +50,10 @@ mod tests {
         assert_eq!(Value::Object(read), json!({"neighbours": 8, "smooth": true, "mode": "a=b"}));
         let twice = values(&given(&["neighbours=8", "neighbours =9"])).unwrap_err().to_string();
         assert_eq!(twice, "\"neighbours\" is given twice, expected one NAME=VALUE for it");
+        for (pair, side) in [("=root", "before"), (" = root", "before"), ("a=", "after"), ("=", "before")] {
+            let message = pairs(&given(&[pair]), "MARKER=POINT", |name| name.into()).unwrap_err().to_string();
+            assert_eq!(message, format!("{pair:?} has nothing {side} the =, expected MARKER=POINT"));
+        }
         let word = pairs(&given(&["foo"]), "FILE=CAMERA", |name| name.into()).unwrap_err().to_string();
         assert_eq!(word, "\"foo\" is not of the form FILE=CAMERA");
     }

@@ -10,7 +10,7 @@ use client::{
 };
 use serde_json::{Map, Value, json};
 
-use crate::{marker_sets, watch};
+use crate::{marker_sets, watch, words::name};
 
 /// Reconstruct a session: a motion from control points, or a body and its motion from what cameras saw
 ///
@@ -32,6 +32,7 @@ use crate::{marker_sets, watch};
   marey run \"take 3\" --kind inverse-kinematics --stature 1.78 --sex male --watch")]
 pub struct Args {
     /// The session, by name or id
+    #[arg(value_parser = name)]
     session: String,
     /// sparse (control points and a motion database), multi-view (cameras) or inverse-kinematics [default: told by the
     /// session's files; required if it has both control points and cameras]
@@ -60,7 +61,7 @@ pub struct Args {
 #[command(next_help_heading = "Measured points")]
 struct PointsArgs {
     /// Control points to use, separated by commas [default: all in the file]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    #[arg(long, value_delimiter = ',', value_parser = name, value_name = "NAMES")]
     points: Vec<String>,
     /// Which markers of the file make which control point: the name of a marker set (see `marey markers --list`), a file with a
     /// marker map, or MARKER=POINT, which may be given several times [default: the marker set that the names belong to]
@@ -101,7 +102,7 @@ struct SparseArgs {
 #[command(next_help_heading = "Cameras")]
 struct CameraArgs {
     /// Cameras to use, separated by commas [default: all that saw something]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    #[arg(long, value_delimiter = ',', value_parser = name, value_name = "NAMES")]
     cameras: Vec<String>,
     /// Which camera a file is from, if its name doesn't tell; may be given several times
     #[arg(long = "camera", value_name = "FILE=CAMERA")]
@@ -166,11 +167,12 @@ impl InverseKinematicsArgs {
 
 /// Runs `marey run`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    let request = request(args)?;
     let client = Client::new(args.server.server()?);
     let session = client
         .find_session(&args.session)?
         .with_context(|| format!("there is no session {:?}; upload its files first", args.session))?;
-    let run: Run = client.post(&format!("/v1/sessions/{}/runs", session.id), &request(args)?)?;
+    let run: Run = client.post(&format!("/v1/sessions/{}/runs", session.id), &request)?;
     println!("run {}", run.id);
     if args.watch {
         watch::until_end(&client, &run.id)?;
