@@ -3,6 +3,7 @@
 mod latency;
 pub mod live;
 pub mod numbers;
+pub mod outputs;
 pub mod parameters;
 mod rest;
 mod server;

@@ -5,5 +5,4 @@
 pub mod bench;
 pub mod evaluate;
 mod motions;
-mod outputs;
 mod progress;

@@ -31,6 +31,13 @@ pub fn read(folders: &[PathBuf]) -> anyhow::Result<Vec<Clip>> {
     Ok(clips)
 }
 
+/// The motion files of folders.
+pub fn files(folders: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    folders.iter().try_for_each(|folder| collect(folder, &mut files))?;
+    Ok(files)
+}
+
 /// Reads single motion files, in the order given; skeletons of AMC files are looked for beside them.
 pub fn read_files(files: &[PathBuf]) -> anyhow::Result<Vec<Clip>> {
     let mut clips = Vec::new();

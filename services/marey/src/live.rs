@@ -20,10 +20,14 @@ use tokio_util::sync::CancellationToken;
 use client::{
     Latency, Server, ServerArgs,
     live::{Connection, Lost, Sender, frame_message},
+    outputs,
     parameters::values,
 };
 
-use crate::{serve::runtime, words::counted};
+use crate::{
+    serve::runtime,
+    words::{counted, name},
+};
 use source::{Measured, Source};
 
 /// After a connection was lost: from the first attempt to the next one, doubled up to the longest wait.
@@ -53,7 +57,7 @@ pub struct Args {
     #[arg(long)]
     skeleton: Option<PathBuf>,
     /// Control points to use, separated by commas [default: all in the file]
-    #[arg(long = "use", value_delimiter = ',', value_name = "POINTS")]
+    #[arg(long = "use", value_delimiter = ',', value_parser = name, value_name = "POINTS")]
     chosen: Vec<String>,
     /// File for the poses, as CSV: frame, then a column for each degree of freedom, metres and radians; what was in it is
     /// replaced [default: the terminal]
@@ -74,10 +78,20 @@ pub struct Args {
 
 /// Runs `marey live`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    check_outputs(args)?;
     let source = Source::open(&args.points, &args.chosen)?;
     let start = start(args, source.names())?;
     let server = args.server.server()?;
     runtime()?.block_on(follow(args, &server, source, start))
+}
+
+/// That the poses and the state replace neither what is read nor each other.
+fn check_outputs(args: &Args) -> anyhow::Result<()> {
+    let points = Some(&args.points).filter(|path| path.as_path() != Path::new("-"));
+    outputs::check(
+        &[("the file of points", points), ("--skeleton", args.skeleton.as_ref())],
+        &[("--output", args.output.as_ref()), ("--state-file", args.state_file.as_ref())],
+    )
 }
 
 fn start(args: &Args, points: &[String]) -> anyhow::Result<Value> {
@@ -324,11 +338,44 @@ async fn send(mut feed: Feed, mut sender: Sender, over: CancellationToken) -> an
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::Parser;
     use futures::{SinkExt, StreamExt};
     use tokio_tungstenite::tungstenite::{
         Message,
         protocol::{CloseFrame, frame::coding::CloseCode},
     };
+
+    #[derive(Debug, clap::Parser)]
+    struct Alone {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    #[test]
+    fn what_is_written_replaces_nothing_that_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        for name in ["p.csv", "sk.asf"] {
+            fs::write(folder.path().join(name), "x").unwrap();
+        }
+        let check = |output: &str, state: &str| {
+            let (points, skeleton) = (path("p.csv"), path("sk.asf"));
+            let (output, state) = (path(output), path(state));
+            let words = ["live", &points, "-d", "walks", "--skeleton", &skeleton];
+            let words = words.into_iter().chain(["-o", &output, "--state-file", &state]);
+            check_outputs(&Alone::parse_from(words).args).map_err(|error| error.to_string())
+        };
+        assert_eq!(check("poses.csv", "p.state"), Ok(()));
+        for (output, state, expected) in [
+            ("p.csv", "p.state", "the file of points and --output are both"),
+            ("sk.asf", "p.state", "--skeleton and --output are both"),
+            ("poses.csv", "sk.asf", "--skeleton and --state-file are both"),
+            ("new", "new", "--output and --state-file are both"),
+        ] {
+            let message = check(output, state).unwrap_err();
+            assert!(message.starts_with(expected), "{message}");
+        }
+    }
 
     #[test]
     fn a_state_file_is_replaced_as_a_whole() {

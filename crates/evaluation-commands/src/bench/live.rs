@@ -12,6 +12,7 @@ use client::{
     Client, Latency, MotionDatabase, Server, ServerArgs,
     live::{Connection, frame_message},
     numbers::positive,
+    outputs,
     parameters::values,
 };
 use nalgebra::Vector3;
@@ -89,6 +90,7 @@ struct Report {
 
 /// Runs `marey bench live`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    outputs::check(&[], &[("--json", args.json.as_ref())])?;
     let folder = tempfile::tempdir()?;
     let performers = performers(args, folder.path())?;
     let (server, database, _process) = match &args.database {

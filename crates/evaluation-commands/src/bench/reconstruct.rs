@@ -9,6 +9,7 @@ use std::{
 };
 
 use anyhow::{Context, bail};
+use client::outputs;
 use evaluation::{ControlSet, control_trajectories};
 use motion_db::{Clip, MotionDatabase, WindowIndex, trial_name};
 use serde::Serialize;
@@ -206,6 +207,7 @@ impl Watch {
 
 /// Runs `marey bench reconstruct`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    outputs::check(&[], &[("--json", args.json.as_ref())])?;
     let clips = motions::read(&args.query)?;
     let step = clips.len().div_ceil(args.trials.max(1)).max(1);
     let trials: Vec<Clip> = clips.into_iter().step_by(step).collect();

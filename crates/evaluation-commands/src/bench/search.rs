@@ -7,11 +7,12 @@ use std::{collections::HashSet, fs, io::BufWriter, path::PathBuf, time::Instant}
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use client::outputs;
 use library::AllCores;
 use motion_db::{Augment, Clip, IndexFile, MotionDatabase, write_index};
 use serde::Serialize;
 
-use crate::{motions, outputs::distinct};
+use crate::motions;
 use pass::{Measured, Search, Truth, measure};
 use questions::Run;
 
@@ -91,9 +92,17 @@ struct Report {
     fast_tracking: Measured,
 }
 
+/// That what is written replaces nothing that is read.
+fn check(args: &Args) -> anyhow::Result<()> {
+    let (train, query) = (motions::files(&args.train)?, motions::files(&args.query)?);
+    let train = train.iter().map(|path| ("a file of --train", Some(path)));
+    let inputs: Vec<_> = train.chain(query.iter().map(|path| ("a file of --query", Some(path)))).collect();
+    outputs::check(&inputs, &[("--index", args.index.as_ref()), ("--json", args.json.as_ref())])
+}
+
 /// Runs `marey bench search`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    distinct(&[("--index", args.index.as_ref()), ("--json", args.json.as_ref())])?;
+    check(args)?;
     let queries = motions::read(&args.query)?;
     let performers: HashSet<&str> = queries.iter().map(|c| c.subject.as_str()).collect();
     let begin = Instant::now();

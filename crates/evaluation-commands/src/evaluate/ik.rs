@@ -4,6 +4,7 @@ use std::{path::PathBuf, time::Instant};
 
 use anyhow::{Context, bail};
 use body::{BodyModel, Shape};
+use client::outputs;
 use evaluation::limbs::{LimbErrors, Limbs, Method, Still, run_all};
 use inverse_kinematics::Recording;
 use model::{Motion, Silhouette};
@@ -115,6 +116,7 @@ struct Json {
 
 /// Runs `marey evaluate ik`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    outputs::check(&[], &[("--json", args.json.as_ref())])?;
     let began = Instant::now();
     let model = BodyModel::shipped();
     let shape = model.shape(&[]);

@@ -13,7 +13,7 @@ use std::{
 
 use anyhow::{Context, bail};
 use body::BodyModel;
-use client::numbers::positive;
+use client::{numbers::positive, outputs};
 use evaluation::training_poses::training_poses;
 use model::{Camera, Silhouette};
 use motion_db::Clip;
@@ -23,7 +23,7 @@ use tracking::{ObservedFrame, Options, Part, ParticleOptions, Tracked, Tracker, 
 use vision::scene::SilhouetteNoise;
 
 use super::{capture::Folder, recovery, shape, written::write};
-use crate::{motions, outputs::distinct, progress::Progress};
+use crate::{motions, progress::Progress};
 use film::Film;
 use joints::{JointErrors, Joints};
 use report::{FrameReport, Report, Settings, Times};
@@ -86,7 +86,7 @@ pub struct Args {
 
 /// Runs `marey evaluate multiview`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    distinct(&[("--model", args.model.as_ref()), ("--json", args.json.as_ref())])?;
+    outputs::check(&[("--model", args.model.as_ref())], &[("--json", args.json.as_ref())])?;
     let model = shape::model(args.model.as_ref())?;
     let folder = Folder::open(&args.folder, &args.cameras)?;
     let mut frames = folder.frames();

@@ -7,7 +7,10 @@ use std::path::PathBuf;
 
 use body::BodyModel;
 use clap::ValueEnum;
-use client::numbers::finite;
+use client::{
+    numbers::{finite, shown},
+    outputs,
+};
 use evaluation::recovery::{Limbs, Method, Setting, recover};
 use tracking::built_in_poses;
 use vision::scene::Ring;
@@ -93,7 +96,9 @@ impl Turned {
 
 /// Runs `marey evaluate recovery`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    if let Some(bad) = args.turned.iter().find(|degrees| !(0.0..=180.0).contains(*degrees)) {
+    outputs::check(&[], &[("--json", args.json.as_ref())])?;
+    if let Some(&bad) = args.turned.iter().find(|degrees| !(0.0..=180.0).contains(*degrees)) {
+        let bad = shown(bad);
         anyhow::bail!("--turned has {bad}, expected degrees from 0 to 180");
     }
     let model = BodyModel::shipped();

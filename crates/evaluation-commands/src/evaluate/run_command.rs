@@ -3,7 +3,7 @@
 use std::{fs, path::PathBuf};
 
 use anyhow::{Context, bail};
-use client::{Client, ResultFile, ServerArgs, encode};
+use client::{Client, ResultFile, ServerArgs, encode, outputs};
 use evaluation::{
     Comparison, ContactThresholds, FootPaths, FootSlide, at_60_hz, compare_in_detail, foot_slide,
     report::{About, run_errors, run_report},
@@ -20,7 +20,6 @@ use super::{
     run_truth::{File, only, true_motion},
     written::{command, write},
 };
-use crate::outputs::distinct;
 
 /// Most bytes of an unpacked file.
 const MAX_BYTES: u64 = 2 << 30;
@@ -83,11 +82,10 @@ struct Json<'a> {
 
 /// Runs `marey evaluate run`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    distinct(&[
-        ("--truth", args.truth.as_ref()),
-        ("--html", args.html.as_ref()),
-        ("--json", args.json.as_ref()),
-    ])?;
+    outputs::check(
+        &[("--truth", args.truth.as_ref())],
+        &[("--html", args.html.as_ref()), ("--json", args.json.as_ref())],
+    )?;
     let client = Client::new(args.server.server()?);
     let run: Run = client.get(&format!("/v1/runs/{}", client.find_run(&args.run)?))?;
     if run.state != "succeeded" {

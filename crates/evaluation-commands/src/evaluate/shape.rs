@@ -10,6 +10,7 @@ use std::{
 
 use anyhow::{Context, bail};
 use body::BodyModel;
+use client::outputs;
 use evaluation::{Body, ShapeErrors, shape_errors};
 use formats::image_files::write_image;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -23,7 +24,6 @@ use super::{
     overlay::{drawn, overlay},
     written::write,
 };
-use crate::outputs::distinct;
 
 /// `marey evaluate shape`
 #[derive(Debug, clap::Args)]
@@ -91,7 +91,7 @@ struct CameraJson<'a> {
 
 /// Runs `marey evaluate shape`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    distinct(&[("--model", args.model.as_ref()), ("--json", args.json.as_ref())])?;
+    outputs::check(&[("--model", args.model.as_ref())], &[("--json", args.json.as_ref())])?;
     let Some(folder) = &args.folder else {
         let Some(scans) = &args.scans else { bail!("give either DIR or --scans") };
         if !args.cameras.is_empty() || args.frame != 0 {

@@ -3,6 +3,7 @@
 use std::{fs, path::PathBuf};
 
 use anyhow::Context;
+use client::outputs;
 use evaluation::{
     ALL, Case, Row, SparseEvaluation, TrialResult, poses_at_60,
     report::{About, sparse_report},
@@ -11,8 +12,6 @@ use evaluation::{
 use serde::Serialize;
 use serde_json::Value;
 use sparse::Parameters;
-
-use crate::outputs::distinct;
 
 /// Files to be written.
 #[derive(Debug, clap::Args)]
@@ -192,13 +191,16 @@ fn quoted(argument: String) -> String {
 }
 
 impl Written {
-    /// That each has a file of its own: known before the evaluation takes its time.
+    /// That each can be written, to a file of its own: known before the evaluation takes its time.
     pub fn check(&self) -> anyhow::Result<()> {
-        distinct(&[
-            ("--json", self.json.as_ref()),
-            ("--markdown", self.markdown.as_ref()),
-            ("--html", self.html.as_ref()),
-        ])
+        outputs::check(
+            &[],
+            &[
+                ("--json", self.json.as_ref()),
+                ("--markdown", self.markdown.as_ref()),
+                ("--html", self.html.as_ref()),
+            ],
+        )
     }
 
     /// Writes what was asked for.
