@@ -7,7 +7,10 @@ use client::{Client, ServerArgs, Session, encode};
 use formats::FileRole;
 use serde_json::Value;
 
-use crate::{session_files, words::counted};
+use crate::{
+    session_files,
+    words::{counted, name},
+};
 
 /// Upload what was recorded: control points and a skeleton, or a calibration and what the cameras saw
 ///
@@ -27,6 +30,7 @@ use crate::{session_files, words::counted};
   marey upload \"take 4\" calib.toml cam*.mp4 plates/     # a session with cameras")]
 pub struct Args {
     /// The session, by name or id; a new one is made if no session has that name
+    #[arg(value_parser = name)]
     session: String,
     /// Files to upload, or folders of pictures
     #[arg(required = true)]
@@ -36,7 +40,7 @@ pub struct Args {
     #[arg(long)]
     role: Option<FileRole>,
     /// Name to store it under, for a single file [default: its own]
-    #[arg(long)]
+    #[arg(long, value_parser = name)]
     name: Option<String>,
     #[command(flatten)]
     server: ServerArgs,
@@ -44,9 +48,13 @@ pub struct Args {
 
 /// Runs `marey upload`.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    anyhow::ensure!(args.name.is_none() || args.files.len() == 1, "--name is for a single file");
     // first of all: a file that is missing must not leave an empty session
     let files = session_files::gather(&args.files)?;
+    anyhow::ensure!(
+        args.name.is_none() || files.len() == 1,
+        "--name is for a single file, found {} to upload",
+        files.len()
+    );
     let client = Client::new(args.server.server()?);
     let (session, is_new) = match client.find_session(&args.session)? {
         Some(session) => (session, false),
