@@ -15,7 +15,7 @@ use client::{
 use formats::archive::{self, Entry, Limits};
 use serde_json::{Value, json};
 
-use crate::{pack, watch};
+use crate::{database::or_removed, pack, watch};
 
 /// `marey body …`
 #[derive(Debug, clap::Subcommand)]
@@ -67,7 +67,7 @@ pub struct LearnArgs {
     #[arg(long, short, value_name = "FILE", conflicts_with = "watch")]
     out: Option<PathBuf>,
     /// Most principal components to keep
-    #[arg(long, default_value_t = ::body::MAX_COMPONENTS)]
+    #[arg(long, default_value_t = ::body::MAX_COMPONENTS, value_parser = components)]
     components: usize,
     /// Length of one unit of the scans, in metres [default: 1; for NPY it is worked out]
     #[arg(long, value_name = "METRES", value_parser = positive)]
@@ -118,6 +118,11 @@ pub struct DeleteArgs {
     which: String,
     #[command(flatten)]
     server: ServerArgs,
+}
+
+fn components(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|number| (1..=::body::MAX_COMPONENTS).contains(number));
+    number.ok_or_else(|| format!("found {text:?}, expected 1 to {}", ::body::MAX_COMPONENTS))
 }
 
 /// Runs `marey body`.
@@ -258,16 +263,20 @@ fn learn_there(args: &LearnArgs) -> anyhow::Result<()> {
     let uploads = pack::pack_where(&args.name, &args.files, &|name| body::is_scan_file(name))?;
     let model: Value = client.post("/v1/body-models", &json!({ "name": args.name }))?;
     let id = model["id"].as_str().context("the answer has no id")?;
-    for upload in uploads {
-        println!("uploading {}", upload.name);
-        client.put_file(&format!("/v1/body-models/{id}/files/{}", encode(&upload.name)), upload.file)?;
-    }
     let mut request = json!({ "components": args.components });
     if let Some(unit) = args.unit {
         request["metres_per_unit"] = unit.into();
     }
-    let run: Run = client.post(&format!("/v1/body-models/{id}/build"), &request)?;
-    println!("building body model {}@{} in run {}", args.name, model["version"], run.id);
+    let path = format!("/v1/body-models/{id}");
+    let called = format!("body model {}@{}", args.name, model["version"]);
+    let run: Run = or_removed(&client, &path, &called, || {
+        for upload in uploads {
+            println!("uploading {}", upload.name);
+            client.put_file(&format!("{path}/files/{}", encode(&upload.name)), upload.file)?;
+        }
+        client.post(&format!("{path}/build"), &request)
+    })?;
+    println!("building {called} in run {}", run.id);
     if args.watch {
         watch::until_end(&client, &run.id)?;
         let model: Value = client.get(&format!("/v1/body-models/{id}"))?;

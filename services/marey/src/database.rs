@@ -2,10 +2,19 @@
 
 use std::path::PathBuf;
 
-use client::{Client, MotionDatabase, Run, ServerArgs, encode, numbers::positive, parameters::values};
+use anyhow::{anyhow, ensure};
+use client::{
+    Client, MotionDatabase, Run, ServerArgs, encode,
+    numbers::{positive, shown},
+    parameters::values,
+};
+use jobs::motion_database::{Augment, Error};
 use serde_json::{Map, Value, json};
 
-use crate::{database_show, pack, watch, words::counted};
+use crate::{
+    database_show, pack, watch,
+    words::{counted, name},
+};
 
 /// `marey db …`
 #[derive(Debug, clap::Subcommand)]
@@ -68,7 +77,7 @@ pub struct AddArgs {
     #[arg(required_unless_present = "without")]
     files: Vec<PathBuf>,
     /// Clips to leave out, by name (see `marey db show NAME --clips`), with everything made from them
-    #[arg(long, value_delimiter = ',', value_name = "CLIPS")]
+    #[arg(long, value_delimiter = ',', value_parser = name, value_name = "CLIPS")]
     without: Vec<String>,
     #[command(flatten)]
     options: BuildOptions,
@@ -77,8 +86,8 @@ pub struct AddArgs {
 #[derive(Debug, clap::Args)]
 struct BuildOptions {
     /// Number of index files to divide it into, which replicas of motion-index share
-    #[arg(long, value_name = "N")]
-    shards: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    shards: Option<u8>,
     /// Length of one unit of BVH files, in metres; the files don't say it [default: 0.01, centimetres]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     bvh_metres_per_unit: Option<f64>,
@@ -156,16 +165,33 @@ impl std::str::FromStr for Augmentation {
 }
 
 /// As the server takes it.
-fn augment(ways: &[Augmentation]) -> Value {
+///
+/// # Errors
+/// If a way is there twice, or a speed is none that the server takes.
+fn augment(ways: &[Augmentation]) -> anyhow::Result<Augment> {
+    let mut mirror = false;
     let mut warps = Vec::new();
     for way in ways {
         match way {
-            Augmentation::Mirror => {}
+            Augmentation::Mirror => {
+                ensure!(!mirror, "--augment has mirror twice, expected each way once");
+                mirror = true;
+            }
             Augmentation::Warp => warps.extend([0.8, 1.25]),
             Augmentation::WarpTo(speed) => warps.push(*speed),
         }
     }
-    json!({ "mirror": ways.contains(&Augmentation::Mirror), "warps": warps })
+    let augment = Augment { mirror, warps };
+    augment.check().map_err(|error| match error {
+        Error::WarpTwice { found } => {
+            anyhow!("--augment has the speed {found} twice, expected each once; warp is 0.8 and 1.25")
+        }
+        Error::Warp { found } => {
+            anyhow!("--augment has warp={}, expected a speed of 0.25 to 4 other than 1", shown(found))
+        }
+        other => anyhow!("--augment: {other}"),
+    })?;
+    Ok(augment)
 }
 
 impl BuildOptions {
@@ -200,11 +226,11 @@ impl BuildOptions {
 pub fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Build(args) => {
-            let client = Client::new(args.options.server.server()?);
             let mut request = args.options.request();
             if !args.augment.is_empty() {
-                request.insert("augment".into(), augment(&args.augment));
+                request.insert("augment".into(), serde_json::to_value(augment(&args.augment)?)?);
             }
+            let client = Client::new(args.options.server.server()?);
             let made = json!({ "name": args.name });
             args.options.finish(&client, start(&client, &made, &args.files, request)?)
         }
@@ -253,6 +279,29 @@ fn start(
     let name = made["name"].as_str().unwrap_or_default();
     let uploads = if files.is_empty() { Vec::new() } else { pack::pack(name, files)? };
     let database: MotionDatabase = client.post("/v1/motion-databases", made)?;
+    let path = format!("/v1/motion-databases/{}", database.id);
+    let called = format!("motion database {}@{}", database.name, database.version);
+    let run = or_removed(client, &path, &called, || {
+        send(client, &path, uploads)?;
+        client.post(&format!("{path}/build"), &Value::Object(request))
+    })?;
+    Ok((database, run))
+}
+
+/// Does what makes a new version whole. If that fails, the version is removed: nothing else would ever complete it.
+pub fn or_removed<T>(
+    client: &Client,
+    path: &str,
+    called: &str,
+    complete: impl FnOnce() -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    complete().map_err(|error| match client.delete(path) {
+        Ok(()) => error,
+        Err(kept) => error.context(format!("{called} was left unfinished, as it can't be removed: {kept:#}")),
+    })
+}
+
+fn send(client: &Client, database: &str, uploads: Vec<pack::Upload>) -> anyhow::Result<()> {
     for upload in uploads {
         let packed = if upload.num_files > 0 {
             format!(" ({})", counted(upload.num_files as u64, "file"))
@@ -260,12 +309,9 @@ fn start(
             String::new()
         };
         println!("uploading {}{packed}", upload.name);
-        let path = format!("/v1/motion-databases/{}/files/{}", database.id, encode(&upload.name));
-        client.put_file(&path, upload.file)?;
+        client.put_file(&format!("{database}/files/{}", encode(&upload.name)), upload.file)?;
     }
-    let path = format!("/v1/motion-databases/{}/build", database.id);
-    let run = client.post(&path, &Value::Object(request))?;
-    Ok((database, run))
+    Ok(())
 }
 
 fn train(args: &TrainArgs) -> anyhow::Result<()> {
@@ -309,10 +355,25 @@ mod tests {
     #[test]
     fn ways_to_make_more_motion_are_read() {
         let read = |text: &str| text.split(',').map(str::parse).collect::<Result<Vec<Augmentation>, _>>();
-        assert_eq!(augment(&read("mirror,warp").unwrap()), json!({"mirror": true, "warps": [0.8, 1.25]}));
-        assert_eq!(augment(&read("warp=0.9").unwrap()), json!({"mirror": false, "warps": [0.9]}));
+        let asked = |text: &str| augment(&read(text).unwrap()).map(|augment| json!(augment));
+        assert_eq!(asked("mirror,warp").unwrap(), json!({"mirror": true, "warps": [0.8, 1.25]}));
+        assert_eq!(asked("warp=0.9").unwrap(), json!({"mirror": false, "warps": [0.9]}));
         for bad in ["mirrors", "warp=", "warp=fast", "warp=nan", "warp=inf", "warp=0", ""] {
             assert!(read(bad).is_err(), "{bad:?}");
+        }
+        for (bad, expected) in [
+            ("mirror,mirror", "--augment has mirror twice"),
+            ("warp=0.5,warp=0.5", "--augment has the speed 0.5 twice"),
+            ("warp,warp=0.8", "--augment has the speed 0.8 twice"),
+            ("warp=1", "--augment has warp=1, expected a speed of 0.25 to 4"),
+            ("warp=1e308", "--augment has warp=1e308, expected"),
+            (
+                "warp=0.3,warp=0.4,warp=0.5,warp=0.6,warp=0.7,warp,warp=2,warp=3",
+                "--augment: augment.warps has 9 speeds",
+            ),
+        ] {
+            let message = asked(bad).unwrap_err().to_string();
+            assert!(message.starts_with(expected), "{message}");
         }
     }
 }
