@@ -156,6 +156,25 @@ mod tests {
         assert!(found.len() > 15, "only {} options are numbers", found.len());
     }
 
+    #[test]
+    fn what_makes_no_sense_is_refused_with_words() {
+        for (words, expected) in [
+            (&["up", "--workers", "0"][..], "0 is not in 1.."),
+            (&["db", "build", "walks", "rec", "--shards", "0"], "0 is not in 1..=64"),
+            (&["db", "build", "walks", "rec", "--shards", "65"], "65 is not in 1..=64"),
+            (&["db", "add", "walks", "--without", "a,"], "found \"\", expected a name"),
+            (&["body", "learn", "b", "scans", "--components", "0"], "found \"0\", expected 1 to 20"),
+            (&["run", "take 3", "--points", "root,,head"], "found \"\", expected a name"),
+            (&["run", " "], "found \" \", expected a name"),
+            (&["upload", " ", "points.csv"], "found \" \", expected a name"),
+            (&["live", "points.csv", "-d", "walks", "--use", ""], "found \"\", expected a name"),
+        ] {
+            let parsed = Cli::try_parse_from(["marey"].iter().chain(words));
+            let message = parsed.map(|_| ()).unwrap_err().to_string();
+            assert!(message.contains(expected), "{words:?}: {message}");
+        }
+    }
+
     fn examples(text: &str) -> impl Iterator<Item = &str> {
         let after = text.lines().skip_while(|line| *line != "Examples:").skip(1);
         after.take_while(|line| !line.is_empty())

@@ -40,8 +40,8 @@ pub struct Args {
     #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDRESS")]
     pub listen: SocketAddr,
     /// Jobs to work on at the same time [default: number of cores]
-    #[arg(long, value_name = "NUMBER")]
-    pub workers: Option<usize>,
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..))]
+    pub workers: Option<u32>,
 }
 
 /// Runs `marey up` until SIGTERM or SIGINT.
@@ -166,7 +166,9 @@ async fn start_services(
     config.code = CODE;
     config.grpc.shutdown_grace = GRACE;
     config.worker.shutdown_grace = GRACE;
-    config.worker.concurrency = args.workers.unwrap_or(config.worker.concurrency);
+    if let Some(workers) = args.workers {
+        config.worker.concurrency = workers as usize;
+    }
     let reconstruction = reconstruction::start(config.clone(), shutdown.clone()).await?;
     replicas.set(reconstruction.address);
     let shape_init = shape_init::start(config.clone(), shutdown.clone()).await?;
