@@ -64,6 +64,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     // before anything is started or made: a folder that can't be used leaves nothing behind
     let given = args.data.as_deref().map(HeldOut::in_folder).transpose()?;
+    given.as_ref().map_or(Ok(()), HeldOut::check)?;
     let mut telemetry = TelemetryConfig::from_variables(&Variables::new(&environment))?;
     telemetry.filter.get_or_insert_with(|| "error".into());
     service::telemetry::start(&telemetry)?;
@@ -166,6 +167,14 @@ mod tests {
         let message = refused(&["16_1.amc", "16_2.amc", "16_3.amc"])?;
         let expected = "found no ASF file with the skeleton of 3 AMC files: 16_1.amc, 16_2.amc, 16_3.amc;";
         assert!(message.contains(expected), "{message}");
+
+        for (files, named) in [
+            (&["1.bvh", "2.bvh", "3.bvh"][..], "1.bvh"),
+            (&["16.asf", "16_1.amc", "16_2.amc", "16_3.amc"], "16_1.amc"),
+        ] {
+            let message = refused(files)?;
+            assert!(message.contains(named) && message.contains("can't be read: "), "{message}");
+        }
 
         let place = tempfile::tempdir()?;
         let (data, out) = (place.path().join("gone"), place.path().join("out"));

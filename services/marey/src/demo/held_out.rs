@@ -23,6 +23,8 @@ pub struct HeldOut {
     pub learned: Vec<Take>,
 }
 
+/// Takes to learn from that are read before the demo starts.
+const READ: usize = 3;
 /// AMC files without a skeleton that are named.
 const NAMED: usize = 5;
 
@@ -50,6 +52,18 @@ impl HeldOut {
         }
         eprintln!("warning: {}: {without_skeleton}; left out", in_folder());
         Self::choose(takes).with_context(in_folder)
+    }
+
+    /// That there is motion in what is tested, all of it, and in the first of what is learned from: known before anything is
+    /// started.
+    ///
+    /// # Errors
+    /// Says which file can't be read, and why.
+    pub fn check(&self) -> anyhow::Result<()> {
+        self.learned.iter().take(READ).chain(&self.tested).try_for_each(|take| {
+            let read = take.read();
+            read.map(|_| ()).with_context(|| format!("{}: can't be read", take.motion.display()))
+        })
     }
 
     /// Divides takes in the order of their names: out of each five takes of a performer one is held out, evenly until there are
