@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use evaluation::{ControlSet, control_trajectories};
 use sample_motion::{Action, DrawOptions, FRAME_RATE, Model, NOTICE};
 
@@ -19,7 +19,8 @@ const NUM_SUBJECTS: u32 = 4;
 ///
 /// Draws trials from a small statistical model of human motion and writes them as ASF and AMC. They are synthetic: good for
 /// trying things, not for measuring how well real motion is reconstructed. Performers keep their names, so trials of several
-/// seeds may go into one folder: seed 1 draws synthetic1 to synthetic4, seed 2 synthetic2 to synthetic5, and so on.
+/// seeds may go into one folder: seed 1 draws synthetic1 to synthetic4, seed 2 synthetic2 to synthetic5, and so on. Files that
+/// are there with something else in them are not replaced.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey sample --out recordings/ --count 40                # to learn from
@@ -78,39 +79,107 @@ pub struct Trials {
 impl Trials {
     /// Writes them into a folder: an ASF for each performer, an AMC for each trial and an `index.csv`, which keeps the rows
     /// of trials that were drawn into the folder before.
+    ///
+    /// # Errors
+    /// If there is a file of one of the names with something else in it; then none is written.
     pub fn write(&self, folder: &Path) -> anyhow::Result<()> {
-        let model = Model::bundled();
-        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        let put = |name: &str, content: &str| -> anyhow::Result<()> {
-            let path = folder.join(name);
-            fs::write(&path, content).with_context(|| path.display().to_string())
-        };
         let path = folder.join("index.csv");
         let mut index = Index::read(&path)?;
+        let model = Model::bundled();
+        self.check(model, folder)?;
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         for number in 0..self.count {
-            let action = self.action.unwrap_or(Action::ALL[number as usize % Action::ALL.len()]);
-            // each performer does each action
-            let person = (number / Action::ALL.len() as u32) % NUM_SUBJECTS;
-            let person = self.seed.wrapping_add(person.into());
-            let options = DrawOptions { frames: self.frames, subject: person };
-            let trial_seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number.into());
-            let motion = model.draw(action, trial_seed, &options)?;
-            // a performer has the same name and skeleton whichever seed draws them
-            let subject = format!("synthetic{person}");
-            let trial = format!("{subject}_{:02}", number + 1);
-            put(&format!("{subject}.asf"), &formats::asf::write(motion.skeleton()))?;
-            put(&format!("{trial}.amc"), &formats::amc::write(&motion))?;
-            if let Some(names) = self.points {
-                let points = control_trajectories(&motion, names)?;
-                put(&format!("{trial}.points.csv"), &formats::points_csv::write(&points))?;
+            let drawn = self.draw(model, number)?;
+            for (name, content) in drawn.files {
+                let path = folder.join(name);
+                fs::write(&path, content).with_context(|| path.display().to_string())?;
             }
-            let frames = motion.num_frames();
-            let file = format!("{trial}.amc");
-            let row = format!("{file},{subject},{trial},{action},{frames},{FRAME_RATE},synthetic {action}");
-            index.rows.insert(file, row);
+            index.rows.insert(drawn.motion_file, drawn.row);
         }
         index.write(&path)
     }
+
+    /// That no file of the folder would be replaced by another. Those that would stay the same may be there: performers who are
+    /// in trials of several seeds are.
+    fn check(&self, model: &Model, folder: &Path) -> anyhow::Result<()> {
+        let num_first = Action::ALL.len() as u32 * NUM_SUBJECTS;
+        let is_there = |name: &str| folder.join(name).exists();
+        for number in 0..self.count {
+            let names = self.names(number);
+            // a performer's later trials have the same skeleton
+            let may_replace = is_there(&names.amc)
+                || is_there(&names.points)
+                || number < num_first && is_there(&names.skeleton);
+            if !may_replace {
+                continue;
+            }
+            for (name, content) in self.draw(model, number)?.files {
+                let path = folder.join(name);
+                if path.exists()
+                    && fs::read(&path).with_context(|| path.display().to_string())? != content.as_bytes()
+                {
+                    bail!("{} exists already and would be replaced; choose a new folder", path.display());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The performer of a trial: each does each action.
+    fn person(&self, number: u32) -> u64 {
+        self.seed.wrapping_add(((number / Action::ALL.len() as u32) % NUM_SUBJECTS).into())
+    }
+
+    /// Draws a trial: its files by name, its motion's first, and its row of the index.
+    fn draw(&self, model: &Model, number: u32) -> anyhow::Result<Drawn> {
+        let action = self.action.unwrap_or(Action::ALL[number as usize % Action::ALL.len()]);
+        let person = self.person(number);
+        let options = DrawOptions { frames: self.frames, subject: person };
+        let trial_seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number.into());
+        let motion = model.draw(action, trial_seed, &options)?;
+        let Names { subject, skeleton, trial, amc, points } = self.names(number);
+        let mut files = vec![
+            (amc.clone(), formats::amc::write(&motion)),
+            (skeleton, formats::asf::write(motion.skeleton())),
+        ];
+        if let Some(names) = self.points {
+            files.push((points, formats::points_csv::write(&control_trajectories(&motion, names)?)));
+        }
+        let frames = motion.num_frames();
+        let row = format!("{amc},{subject},{trial},{action},{frames},{FRAME_RATE},synthetic {action}");
+        Ok(Drawn { motion_file: amc, files, row })
+    }
+
+    /// What a trial and its files are called: a performer has the same name and skeleton whichever seed draws them.
+    fn names(&self, number: u32) -> Names {
+        let subject = format!("synthetic{}", self.person(number));
+        let trial = format!("{subject}_{:02}", number + 1);
+        Names {
+            skeleton: format!("{subject}.asf"),
+            amc: format!("{trial}.amc"),
+            points: format!("{trial}.points.csv"),
+            subject,
+            trial,
+        }
+    }
+}
+
+/// What a trial and its files are called.
+struct Names {
+    subject: String,
+    skeleton: String,
+    trial: String,
+    amc: String,
+    points: String,
+}
+
+/// A trial.
+struct Drawn {
+    motion_file: String,
+    /// each with its content
+    files: Vec<(String, String)>,
+    /// of the index
+    row: String,
 }
 
 /// What `index.csv` says of each trial.
@@ -179,6 +248,30 @@ mod tests {
         let performers: BTreeSet<_> = index.rows.keys().filter_map(|file| file.split_once('_')).collect();
         let performers: BTreeSet<_> = performers.into_iter().map(|(performer, _)| performer).collect();
         assert_eq!(performers.len(), 9);
+        Ok(())
+    }
+
+    #[test]
+    fn other_files_are_not_replaced() -> anyhow::Result<()> {
+        let place = tempfile::tempdir()?;
+        let folder = place.path().join("rec");
+        let drawn = |frames, points: Option<usize>| {
+            let points = points.and_then(ControlSet::names);
+            Trials { count: 5, seed: 1, action: None, frames, points }.write(&folder)
+        };
+        drawn(8, Some(4))?;
+        // the same again
+        drawn(8, Some(4))?;
+        let before = fs::read(folder.join("synthetic1_01.amc"))?;
+        let message = drawn(9, None).unwrap_err().to_string();
+        assert!(message.contains("synthetic1_01.amc exists already and would be replaced"), "{message}");
+        let message = drawn(8, Some(6)).unwrap_err().to_string();
+        assert!(message.contains("synthetic1_01.points.csv exists already"), "{message}");
+        assert_eq!(fs::read(folder.join("synthetic1_01.amc"))?, before);
+        // a performer of one's own, of that name
+        fs::write(folder.join("synthetic2.asf"), "mine")?;
+        let message = drawn(8, Some(4)).unwrap_err().to_string();
+        assert!(message.contains("synthetic2.asf exists already"), "{message}");
         Ok(())
     }
 
