@@ -350,7 +350,46 @@ fn list(client: &Client) -> anyhow::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use std::{
+        io::{BufRead, BufReader, Write},
+        net::TcpListener,
+    };
+
+    use client::Server;
+
     use super::*;
+
+    /// The first line of the one request that comes in, which is answered by `status`.
+    fn answer(status: &'static str) -> (Client, std::thread::JoinHandle<String>) {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let url = format!("http://{}", listener.local_addr().unwrap());
+        let asked = std::thread::spawn(move || {
+            let mut stream = BufReader::new(listener.accept().unwrap().0);
+            let (mut first, mut line) = (String::new(), String::new());
+            stream.read_line(&mut first).unwrap();
+            while stream.read_line(&mut line).unwrap() > 2 {
+                line.clear();
+            }
+            let answer = format!("HTTP/1.1 {status}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+            stream.get_mut().write_all(answer.as_bytes()).unwrap();
+            first.trim_end().to_owned()
+        });
+        (Client::new(Server { url, api_key: "mk_test".into(), database_url: None }), asked)
+    }
+
+    #[test]
+    fn a_version_that_is_refused_is_removed() {
+        for (status, expected) in
+            [("204 No Content", "refused"), ("409 Conflict", "motion database walks@2 was left unfinished, ")]
+        {
+            let (client, asked) = answer(status);
+            let refused = || -> anyhow::Result<()> { Err(anyhow!("refused")) };
+            let error = or_removed(&client, "/v1/motion-databases/7", "motion database walks@2", refused);
+            let message = format!("{:#}", error.unwrap_err());
+            assert!(message.starts_with(expected) && message.ends_with("refused"), "{message}");
+            assert_eq!(asked.join().unwrap(), "DELETE /v1/motion-databases/7 HTTP/1.1");
+        }
+    }
 
     #[test]
     fn ways_to_make_more_motion_are_read() {
