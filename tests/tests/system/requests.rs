@@ -161,7 +161,8 @@ fn a_request_is_one_of_its_kinds_and_every_example_is_accepted_as_printed() -> R
     assert_eq!(examples.len(), kinds.len());
 
     let points = crate::points_csv(5, 240)?;
-    let session = api.session("s", &[("points.csv", points.as_bytes()), CALIBRATION, MASKS])?;
+    let filmed = ("GX010042.MP4", &b"x"[..]);
+    let session = api.session("s", &[("points.csv", points.as_bytes()), CALIBRATION, MASKS, filmed])?;
     let empty = api.session("empty", &[])?;
     for (kind, example) in examples {
         let (status, word) = ask(api, &session, &example["value"])?;
