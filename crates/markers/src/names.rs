@@ -93,10 +93,10 @@ pub fn find_name<'a>(name: &str, all: &'a [String]) -> Result<Option<&'a str>> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn names(list: &[&str]) -> Vec<String> {
+    pub(crate) fn names(list: &[&str]) -> Vec<String> {
         list.iter().map(|n| (*n).to_owned()).collect()
     }
 

@@ -16,11 +16,7 @@ pub fn standard_names(names: &[String]) -> Vec<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{MarkerMap, template};
-
-    fn names(list: &[&str]) -> Vec<String> {
-        list.iter().map(|n| (*n).to_owned()).collect()
-    }
+    use crate::{MarkerMap, names::tests::names, template};
 
     #[test]
     fn two_standard_names_make_a_file_of_control_points() {
