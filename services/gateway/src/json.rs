@@ -191,9 +191,7 @@ impl<'de> Deserializer<'de> for Node<'de> {
                     _ => Err(Refusal::invalid_length(array.len(), &"fewer")),
                 }
             }
-            Value::Object(object) => {
-                visitor.visit_map(Fields { rest: object.iter(), known: &[], last: None })
-            }
+            Value::Object(object) => visitor.visit_map(Fields::new(object, &[])),
         }
     }
 
@@ -216,7 +214,7 @@ impl<'de> Deserializer<'de> for Node<'de> {
         visitor: V,
     ) -> Result<V::Value, Refusal> {
         match self.0 {
-            Value::Object(object) => visitor.visit_map(Fields { rest: object.iter(), known, last: None }),
+            Value::Object(object) => visitor.visit_map(Fields::new(object, known)),
             _ => Err(Refusal::invalid_type(self.unexpected(), &"a map")),
         }
     }
@@ -230,8 +228,7 @@ impl<'de> Deserializer<'de> for Node<'de> {
         match self.0 {
             Value::String(word) => visitor.visit_enum(BorrowedStrDeserializer::new(word)),
             Value::Object(object) if object.len() == 1 => {
-                let fields = Fields { rest: object.iter(), known: &[], last: None };
-                visitor.visit_enum(MapAccessDeserializer::new(fields))
+                visitor.visit_enum(MapAccessDeserializer::new(Fields::new(object, &[])))
             }
             _ => Err(Refusal::invalid_type(self.unexpected(), &one_of(known).as_str())),
         }
@@ -268,6 +265,12 @@ struct Fields<'de> {
     /// those that count as left out when they are null
     known: &'static [&'static str],
     last: Option<(&'de str, &'de Value)>,
+}
+
+impl<'de> Fields<'de> {
+    fn new(object: &'de Map<String, Value>, known: &'static [&'static str]) -> Self {
+        Self { rest: object.iter(), known, last: None }
+    }
 }
 
 impl<'de> MapAccess<'de> for Fields<'de> {
