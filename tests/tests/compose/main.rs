@@ -23,6 +23,8 @@ const CHUNK_FRAMES: usize = 300;
 const NUM_CHUNKS: usize = 16;
 /// Between two looks at the jobs of a run.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// After this, what a container sent before it was frozen has been done: that takes milliseconds.
+const SETTLE: Duration = Duration::from_millis(500);
 
 /// A result's name and content.
 type Files = Vec<(String, Vec<u8>)>;
@@ -160,6 +162,8 @@ fn kill_a_busy_replica(stack: &Stack, api: &Api, run: &str) -> Result<String> {
         for worker in Chunks::from_run(api, run)?.running_on {
             let container = stack::container_of(&worker)?;
             stack.docker(&["pause", &container])?;
+            // It may have sent the chunk's end to PostgreSQL before that: such a chunk isn't begun again.
+            std::thread::sleep(SETTLE);
             if Chunks::from_run(api, run)?.running_on.contains(&worker) {
                 stack.docker(&["kill", "--signal", "KILL", &container])?;
                 return Ok(worker);
