@@ -74,10 +74,16 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         counted(file.num_frames() as u64, "frame"),
         file.frame_rate()
     );
+    let is_measured = is_measured(&file);
+    if !is_measured {
+        println!("nothing is measured in it: no run can use it");
+    }
     // as runs take them: names that are control points come before any marker set
     let standard = if args.map.is_none() { standard_names(file.names()) } else { Vec::new() };
     if !standard.is_empty() {
-        println!("{}", as_they_are(file.names(), &standard));
+        if is_measured {
+            println!("{}", as_they_are(file.names(), &standard));
+        }
         show(&MarkerMap::from_pairs(standard.iter().map(|name| (*name, *name))), &file)?;
         if let Some(to) = &args.write {
             write(to, &file, None)?;
@@ -127,6 +133,11 @@ fn list() {
             println!("{:<20} also {}", "", map.aliases.join(", "));
         }
     }
+}
+
+/// Whether any point is measured in any frame.
+fn is_measured(file: &PointTrajectories) -> bool {
+    (0..file.num_frames()).any(|frame| (0..file.num_points()).any(|p| file.position(frame, p).is_some()))
 }
 
 /// What a file is whose names are control points. Those beside the standard ones must be joints: only a run,
@@ -236,6 +247,7 @@ pub fn request(given: &[String]) -> anyhow::Result<Map<String, Value>> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
     use serde_json::json;
 
     use super::*;
@@ -271,6 +283,16 @@ mod tests {
         let more = names(&["left_wrist", "LeftKnee", "right_wrist"]);
         let said = as_they_are(&more, &standard_names(&more));
         assert!(said.contains("(LeftKnee)") && said.ends_with("--points left_wrist,right_wrist"), "{said}");
+    }
+
+    #[test]
+    fn a_file_without_a_measured_sample_is_known() {
+        let file = |x: f64| {
+            let positions = vec![Vector3::from_element(f64::NAN), Vector3::new(x, 1.0, 0.0)];
+            PointTrajectories::new(vec!["head".to_owned()], 60.0, positions).unwrap()
+        };
+        assert!(is_measured(&file(0.5)));
+        assert!(!is_measured(&file(f64::NAN)));
     }
 
     #[test]
