@@ -1,9 +1,11 @@
+use model::shown;
+
 /// Why no silhouette can be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A parameter out of its range.
-    #[error("parameter {name} is {found}, expected {low} to {high}")]
+    #[error("parameter {name} is {}, expected {low} to {high}", shown(*found))]
     Parameter {
         /// its name
         name: &'static str,

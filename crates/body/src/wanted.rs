@@ -1,6 +1,7 @@
 //! Bodies by simple measurements. What is asked for gives the most probable coefficients α, whichever of the
 //! measurements are known, by what [`crate::population`] tells of them; Newton steps make stature and mass exact.
 
+use model::shown;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::extremes::{heights, lowest_and_highest};
@@ -33,6 +34,7 @@ impl Wanted {
         ];
         for (name, value, low, high, unit) in ranges {
             if let Some(value) = value.filter(|value| !(low..=high).contains(value)) {
+                let value = shown(value);
                 let what = format!("{name} of {value} {unit} was asked for, expected {low} to {high}");
                 return Err(Error::Wanted { what });
             }

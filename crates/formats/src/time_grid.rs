@@ -1,5 +1,7 @@
 //! From the times of rows to frames of a constant rate.
 
+use model::shown;
+
 use crate::{
     Error, Result,
     frame_rate::{decimals, from_period},
@@ -78,11 +80,11 @@ impl Times {
             let frame = place.round();
             let expected = frames.last().map_or(0, |last: &usize| last + 1);
             if frame < expected as f64 {
-                let found = format!("time {time} s, less than half a frame after the row before");
+                let found = format!("time {} s, less than half a frame after the row before", shown(*time));
                 return Err(Error::at_line(*line, found, "times that rise from row to row"));
             }
             if frame >= max_frames as f64 {
-                let found = format!("time {time} s, frame {frame} at {rate} Hz");
+                let found = format!("time {} s, frame {} at {rate} Hz", shown(*time), shown(frame));
                 return Err(Error::at_line(
                     *line,
                     found,

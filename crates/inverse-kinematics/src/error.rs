@@ -1,3 +1,5 @@
+use model::shown;
+
 /// Why a chain or a problem cannot be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -33,7 +35,7 @@ pub enum Error {
         high: f64,
     },
     /// A setting out of range.
-    #[error("{name} is {value}, expected {expected}")]
+    #[error("{name} is {}, expected {expected}", shown(*value))]
     Setting {
         /// name of the setting
         name: &'static str,

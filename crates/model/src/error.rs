@@ -1,3 +1,5 @@
+use crate::shown;
+
 /// What is wrong with a skeleton, a motion or a set of trajectories.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -48,7 +50,7 @@ pub enum Error {
         dofs: usize,
     },
     /// A frame rate that is not positive and finite.
-    #[error("frame rate is {found}, expected a positive number")]
+    #[error("frame rate is {}, expected a positive number", shown(*found))]
     FrameRate {
         /// the rate found
         found: f64,
@@ -82,7 +84,10 @@ pub enum Error {
         positions: usize,
     },
     /// A standard deviation that is not positive and finite.
-    #[error("frame {frame}, point {point} has a standard deviation of {found} m, expected a positive number")]
+    #[error(
+        "frame {frame}, point {point} has a standard deviation of {} m, expected a positive number",
+        shown(*found)
+    )]
     Sigma {
         /// frame, from 0
         frame: usize,

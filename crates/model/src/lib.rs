@@ -22,6 +22,7 @@ mod motion;
 mod point_match;
 mod points;
 mod record;
+mod shown;
 mod silhouette;
 mod skeleton;
 
@@ -34,6 +35,7 @@ pub use motion::Motion;
 pub use point_match::PointMatch;
 pub use points::{PointTrajectories, Samples};
 pub use record::SkeletonRecord;
+pub use shown::shown;
 pub use silhouette::Silhouette;
 pub use skeleton::Skeleton;
 

@@ -1,3 +1,5 @@
+use model::shown;
+
 /// Why a database cannot be built, read or asked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -40,7 +42,7 @@ pub enum Error {
         reason: String,
     },
     /// A speed that motion cannot be played at.
-    #[error("speed is {found}, expected 1/{max} to {max} times the recorded one")]
+    #[error("speed is {}, expected 1/{max} to {max} times the recorded one", shown(*found))]
     Speed {
         /// speed asked for
         found: f64,
@@ -101,7 +103,9 @@ pub enum Error {
     },
     /// A coordinate that no person can have.
     #[error(
-        "clip {clip}: coordinate {dof} of frame {frame} (60 a second) is {found}, expected at most 10000 metres or radians"
+        "clip {clip}: coordinate {dof} of frame {frame} (60 a second) is {}, expected at most 10000 metres \
+         or radians",
+        shown(*found)
     )]
     Value {
         /// name of the clip

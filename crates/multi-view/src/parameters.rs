@@ -1,3 +1,4 @@
+use model::shown;
 use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
@@ -107,7 +108,7 @@ impl Parameters {
             });
         }
         if let Some(rate) = self.frame_rate.filter(|rate| !(1.0..=1000.0).contains(rate)) {
-            let found = rate.to_string();
+            let found = shown(rate);
             return Err(Error::Parameter {
                 name: "frame_rate",
                 found,
@@ -115,11 +116,11 @@ impl Parameters {
             });
         }
         if !(0.002..=0.1).contains(&self.hull_voxel_m) {
-            let found = self.hull_voxel_m.to_string();
+            let found = shown(self.hull_voxel_m);
             return Err(Error::Parameter { name: "hull_voxel_m", found, expected: "0.002 to 0.1 metres" });
         }
         if !(0.3..=1.0).contains(&self.least_overlap) {
-            let found = self.least_overlap.to_string();
+            let found = shown(self.least_overlap);
             return Err(Error::Parameter { name: "least_overlap", found, expected: "0.3 to 1" });
         }
         Ok(self.background.check()?)

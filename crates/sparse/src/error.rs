@@ -1,3 +1,5 @@
+use model::shown;
+
 /// Why a session cannot be reconstructed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -48,7 +50,8 @@ pub enum Error {
     /// Coordinates of another system, such as a map's.
     #[error(
         "{count} of {measured} measured samples are more than 100 km from the origin (the first: {point} in frame {frame} at \
-         {x:.0} {y:.0} {z:.0} m): expected metres from an origin near the capture", x = position[0], y = position[1], z = position[2]
+         {} m): expected metres from an origin near the capture",
+        position.map(|v| shown(v.round())).join(" ")
     )]
     FarFromOrigin {
         /// samples that far away

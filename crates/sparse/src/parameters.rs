@@ -1,3 +1,4 @@
+use model::shown;
 use posterior::SolverParameters;
 use regression::gplvm::GplvmParameters;
 use regression::{LpcaParameters, LpcrParameters};
@@ -204,7 +205,7 @@ impl Parameters {
             if value >= low && value <= high {
                 return Ok(());
             }
-            Err(Error::Parameter { name, found: value.to_string(), expected })
+            Err(Error::Parameter { name, found: shown(value), expected })
         };
         count("window", self.window, 1, 16, "1 to 16 frames")?;
         count("neighbours", self.neighbours, 2, 1024, "2 to 1024")?;

@@ -1,3 +1,5 @@
+use model::shown;
+
 /// Why nothing could be tracked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -31,7 +33,7 @@ pub enum Error {
         dofs: usize,
     },
     /// Settings that make no search.
-    #[error("{what} is {found}, expected {expected}")]
+    #[error("{what} is {}, expected {expected}", shown(*found))]
     Option {
         /// which setting
         what: &'static str,

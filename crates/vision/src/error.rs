@@ -1,3 +1,5 @@
+use model::shown;
+
 /// What keeps a computation on silhouettes and meshes from a result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -55,7 +57,7 @@ pub enum Error {
         most: usize,
     },
     /// A parameter out of range.
-    #[error("{name} is {found}, expected {expected}")]
+    #[error("{name} is {}, expected {expected}", shown(*found))]
     Parameter {
         /// its name
         name: &'static str,

@@ -3,12 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::{anyhow, ensure};
-use client::{
-    Client, MotionDatabase, Run, ServerArgs, encode,
-    numbers::{positive, shown},
-    parameters::values,
-};
+use client::{Client, MotionDatabase, Run, ServerArgs, encode, numbers::positive, parameters::values};
 use jobs::motion_database::{Augment, Error};
+use model::shown;
 use serde_json::{Map, Value, json};
 
 use crate::{

@@ -281,6 +281,15 @@ fn a_body_that_nobody_has_is_refused_before_there_is_a_run() -> Result<()> {
             json!({"alpha": [0, 99]}),
             "inverse_kinematics.alpha[1] is 99, expected -6 to 6 standard deviations",
         ),
+        (
+            json!({"stature_m": 1e308}),
+            "inverse_kinematics: stature of 1e308 m was asked for, expected 1 to 2.4",
+        ),
+        (
+            json!({"alpha": [-1e308]}),
+            "inverse_kinematics.alpha[0] is -1e308, expected -6 to 6 standard deviations",
+        ),
+        (json!({"frame_rate": 1e308}), "inverse_kinematics.frame_rate is 1e308, expected 1 to 1000"),
         (json!({"alpha": [0], "mass_kg": 70}), "inverse_kinematics.alpha is given beside measurements"),
         (json!({"alpha": vec![0; 1000]}), "inverse_kinematics.alpha has 1000 numbers, expected at most"),
     ] {

@@ -7,11 +7,9 @@ use std::path::PathBuf;
 
 use body::BodyModel;
 use clap::ValueEnum;
-use client::{
-    numbers::{finite, shown},
-    outputs,
-};
+use client::{numbers::finite, outputs};
 use evaluation::recovery::{Limbs, Method, Setting, recover};
+use model::shown;
 use tracking::built_in_poses;
 use vision::scene::Ring;
 

@@ -1,3 +1,5 @@
+use model::shown;
+
 use super::{
     bytes::Processor,
     ends_early,
@@ -52,7 +54,7 @@ impl Header {
         }
         let rate = number("RATE").filter(|r| *r > 0.0).unwrap_or(float(11));
         if !(1e-6..=1e6).contains(&rate) {
-            return Err(at_byte(20, format!("a frame rate of {rate} Hz"), "one from 1e-6 to 1e6"));
+            return Err(at_byte(20, format!("a frame rate of {} Hz", shown(rate)), "one from 1e-6 to 1e6"));
         }
         let start = match word(9) {
             0 => count("DATA_START").unwrap_or_default(),

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use model::{Camera, Distortion};
+use model::{Camera, Distortion, shown};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 
 use super::{FileCamera, FileCameras, MOST_CAMERAS, Options, UpAxis, check, up::Stated};
@@ -29,7 +29,7 @@ pub(super) fn cameras(found: FileCameras, options: &Options, warnings: &mut Warn
     }
     let metres = options.metres_per_unit.or(metres).unwrap_or(1.0);
     if !(metres > 0.0 && metres.is_finite()) {
-        return Err(Error::whole_file(format!("{metres} metres per unit"), "a positive number"));
+        return Err(Error::whole_file(format!("{} metres per unit", shown(metres)), "a positive number"));
     }
     let rotations = files.iter().map(rotation).collect::<Result<Vec<_>>>()?;
     let up = up_axis(stated, options.up, &rotations, warnings);

@@ -1,3 +1,4 @@
+use model::shown;
 use serde::{Deserialize, Serialize};
 
 /// Most speeds of one augmentation.
@@ -26,7 +27,7 @@ pub enum Error {
         found: usize,
     },
     /// No speed of motion.
-    #[error("augment.warps has {found}, expected speeds of 0.25 to 4 other than 1")]
+    #[error("augment.warps has {}, expected speeds of 0.25 to 4 other than 1", shown(*found))]
     Warp {
         /// The speed.
         found: f64,

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use model::SkeletonRecord;
+use model::{SkeletonRecord, shown};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -183,7 +183,7 @@ impl Live<'_> {
         let recent: Vec<_> = numbers.as_chunks::<3>().0.iter().map(|p| Vector3::from(*p)).collect();
         // NaN stands for what was not measured
         if let Some(far) = numbers.iter().find(|v| v.abs() > MAX_DISTANCE_M) {
-            return Err(wrong(format!("with a measurement at {far} m"), "at most 100 km"));
+            return Err(wrong(format!("with a measurement at {} m", shown(*far)), "at most 100 km"));
         }
         Ok(Known { header, tracks, pose, variances, recent })
     }

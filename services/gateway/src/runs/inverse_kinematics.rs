@@ -5,6 +5,7 @@ use formats::FileRole;
 use jobs::inverse_kinematics::{
     BodyDescription, InverseKinematics, Method, RUN_KIND, Sex, SolveInverseKinematics,
 };
+use model::shown;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use sqlx::PgConnection;
@@ -153,7 +154,7 @@ impl InverseKinematicsRequest {
             return refuse(format!("inverse_kinematics.steps is {steps}, expected 1 to {}", STEPS.0));
         }
         if let Some(rate) = self.frame_rate.filter(|rate| !FRAME_RATES.contains(rate)) {
-            return refuse(format!("inverse_kinematics.frame_rate is {rate}, expected 1 to 1000"));
+            return refuse(format!("inverse_kinematics.frame_rate is {}, expected 1 to 1000", shown(rate)));
         }
         self.check_body()
     }
@@ -179,7 +180,9 @@ impl InverseKinematicsRequest {
         match self.alpha.iter().enumerate().find(|(_, a)| a.abs() > MAX_DEVIATIONS) {
             None => Ok(()),
             Some((number, a)) => refuse(format!(
-                "inverse_kinematics.alpha[{number}] is {a}, expected -{MAX_DEVIATIONS} to {MAX_DEVIATIONS} standard deviations"
+                "inverse_kinematics.alpha[{number}] is {}, expected -{MAX_DEVIATIONS} to {MAX_DEVIATIONS} standard \
+                 deviations",
+                shown(*a)
             )),
         }
     }

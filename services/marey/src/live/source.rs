@@ -3,9 +3,8 @@
 use std::{io::BufRead, path::Path, time::Instant};
 
 use anyhow::{Context, ensure};
-use client::numbers::shown;
 use formats::session::{self, Options};
-use model::{PointTrajectories, Samples};
+use model::{PointTrajectories, Samples, shown};
 use nalgebra::Vector3;
 use tokio::sync::mpsc;
 
