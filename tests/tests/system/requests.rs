@@ -8,6 +8,14 @@ const POINTS: (&str, &[u8]) = ("points.csv", b"time,a_x,a_y,a_z\n0,0,0,0\n");
 const CALIBRATION: (&str, &[u8]) = ("calibration.json", b"{}");
 const MASKS: (&str, &[u8]) = ("silhouettes.tar", b"x");
 
+/// A project with a session that has something for every kind of run.
+fn session_with_all() -> Result<(System, Api, String)> {
+    let system = System::start()?;
+    let api = system.project("p")?;
+    let session = api.session("s", &[POINTS, CALIBRATION, MASKS])?;
+    Ok((system, api, session))
+}
+
 /// Posts a request for a run; status and, of a refusal, its words, of a run, its kind.
 fn ask(api: &Api, session: &str, request: &Value) -> Result<(u16, String)> {
     let answer = api.post(&format!("{session}/runs"), request)?;
@@ -21,9 +29,7 @@ fn ask(api: &Api, session: &str, request: &Value) -> Result<(u16, String)> {
 
 #[test]
 fn a_field_that_no_kind_has_is_refused_by_every_kind() -> Result<()> {
-    let system = System::start()?;
-    let api = system.project("p")?;
-    let session = api.session("s", &[POINTS, CALIBRATION, MASKS])?;
+    let (_system, api, session) = session_with_all()?;
     for (kind, field) in [
         ("sparse", "motion_database"),
         ("multi-view", "background"),
@@ -50,9 +56,7 @@ fn a_field_that_no_kind_has_is_refused_by_every_kind() -> Result<()> {
 
 #[test]
 fn a_field_of_another_kind_is_refused_and_said_where_it_belongs() -> Result<()> {
-    let system = System::start()?;
-    let api = system.project("p")?;
-    let session = api.session("s", &[POINTS, CALIBRATION, MASKS])?;
+    let (_system, api, session) = session_with_all()?;
     for (kind, field, value, belongs) in [
         ("sparse", "cameras", json!(["cam1"]), "multi-view and inverse-kinematics"),
         ("sparse", "body_model", json!("shipped"), "multi-view and inverse-kinematics"),
@@ -175,9 +179,7 @@ fn a_request_is_one_of_its_kinds_and_every_example_is_accepted_as_printed() -> R
 
 #[test]
 fn a_value_of_another_type_is_refused_with_the_name_of_its_field() -> Result<()> {
-    let system = System::start()?;
-    let api = system.project("p")?;
-    let session = api.session("s", &[POINTS, CALIBRATION, MASKS])?;
+    let (_system, api, session) = session_with_all()?;
     let sparse = |field: &str, value: Value| {
         let mut request = json!({"kind": "sparse", "motion_database": "walks"});
         request[field] = value;
@@ -220,9 +222,7 @@ fn a_value_of_another_type_is_refused_with_the_name_of_its_field() -> Result<()>
 
 #[test]
 fn no_text_of_a_request_has_a_nul_and_no_key_is_given_twice() -> Result<()> {
-    let system = System::start()?;
-    let api = system.project("p")?;
-    let session = api.session("s", &[POINTS, CALIBRATION, MASKS])?;
+    let (_system, api, session) = session_with_all()?;
     for (request, named) in [
         (json!({"motion_database": "wa\u{0}lks"}), "motion_database has a NUL"),
         (json!({"kind": "multi-view", "body_model": "a\u{0}"}), "body_model has a NUL"),
