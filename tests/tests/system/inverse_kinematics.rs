@@ -195,6 +195,11 @@ fn one_camera_is_enough_and_none_too() -> Result<()> {
         json!({ "inverse_kinematics": {}, "cameras": ["cam1"] }),
         "cameras is for runs that use cameras",
     )?;
+    // none of the names that could be meant can be used
+    refused(
+        json!({ "inverse_kinematics": {}, "parameters": { "x": 1 } }),
+        "parameters is for runs that use cameras",
+    )?;
     // what only the model knows ends the run, with words
     let run =
         api.start_run(&session, &json!({ "inverse_kinematics": { "stature_m": 1.0, "mass_kg": 250 } }))?;

@@ -105,9 +105,9 @@ impl SessionRun for InverseKinematicsRun {
     }
 
     fn check(&self) -> Result<()> {
+        // the fields of cameras are checked when it is known whether there are any
         self.inverse_kinematics.check()?;
-        self.markers.check()?;
-        self.cameras.check()
+        self.markers.check()
     }
 
     async fn plan(self, db: &mut PgConnection, project_id: Uuid, on: OnSession) -> Result<NewRun> {
@@ -121,9 +121,9 @@ impl SessionRun for InverseKinematicsRun {
         let choice = self.markers.into();
         let how = InverseKinematics { choice, ..self.inverse_kinematics.resolve(solver)? };
         let session_id = on.session.id;
-        if !solver.uses_images()
-            && let Some(field) = self.cameras.first_given()?
-        {
+        if solver.uses_images() {
+            self.cameras.check()?;
+        } else if let Some(field) = self.cameras.first_given()? {
             return Err(Error::Unprocessable(format!(
                 "{field} is for runs that use cameras, and this one uses none; upload a calibration and what the cameras \
                  saw, or leave {field} out"
