@@ -5,7 +5,7 @@ use axum::{
     extract::{FromRequest, FromRequestParts, RawPathParams, Request, rejection::BytesRejection},
     http::{Method, StatusCode, header, request::Parts},
 };
-use serde::de::DeserializeOwned;
+use serde::{Deserialize, de::DeserializeOwned};
 
 use crate::{App, error::Error, idempotency::RequestKey, json, query, versioned};
 
@@ -83,6 +83,11 @@ impl<T: DeserializeOwned> FromRequest<App> for Posted<T> {
         Ok(Self { body: parsed, request: RequestKey::read(&headers, &method, &path, &body)? })
     }
 }
+
+/// The body of a POST that has no fields.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NoFields {}
 
 fn check_is_json(headers: &axum::http::HeaderMap) -> Result<(), Error> {
     let found = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("none");

@@ -249,6 +249,27 @@ fn no_text_of_a_request_has_a_nul_and_no_key_is_given_twice() -> Result<()> {
 }
 
 #[test]
+fn a_request_without_fields_takes_none() -> Result<()> {
+    let (_system, api, session) = session_with_all()?;
+    let run = api.start_run(&session, &json!({"kind": "multi-view"}))?;
+    let cancel = format!("{run}/cancel");
+    for (body, status, expected) in [
+        (&br#"{"force": true}"#[..], 422, "force is not known; there are none"),
+        (b"[]", 422, "the request is an array, expected an object"),
+        (b"at once", 400, "body is not JSON"),
+    ] {
+        let refused = api.post_raw(&cancel, body, "application/json")?;
+        let detail = refused.json()["detail"].as_str().unwrap_or_default().to_owned();
+        assert_eq!(refused.status, status, "{detail}");
+        assert!(detail.starts_with(expected), "{detail}");
+    }
+    assert_eq!(api.get(&run)?.json()["state"], "queued");
+    assert_eq!(api.post_raw(&cancel, b"", "application/json")?.json()["state"], "cancelled");
+    assert_eq!(api.post(&cancel, &json!({}))?.status, 200);
+    Ok(())
+}
+
+#[test]
 fn an_id_that_is_none_names_nothing() -> Result<()> {
     let system = System::start()?;
     let api = system.project("p")?;

@@ -6,7 +6,7 @@ use crate::{
     access::{Access, Reader, Writer},
     answer::Answer,
     error::Result,
-    extract::{Path, Posted, Query},
+    extract::{NoFields, Path, Posted, Query},
     files,
     lock::Lock,
     page::{Page, PageQuery},
@@ -102,6 +102,7 @@ pub(super) async fn show(
 pub(super) async fn cancel(
     Writer(Access { app, caller }): Writer,
     Path(run_id): Path<Uuid>,
+    _: Posted<NoFields>,
 ) -> Result<Json<RunWithJobs>> {
     let mut tx = app.db.begin().await?;
     run::find(&mut tx, caller.project_id, run_id).await?;
