@@ -17,9 +17,11 @@ pub enum Error {
     /// The key lacks a scope.
     #[error("this API key has no scope {0:?}")]
     Forbidden(&'static str),
-    /// There is no such thing in the caller's project.
-    #[error("there is no {what} {which:?} in this project")]
+    /// There is no such thing in the caller's project, or in something of it.
+    #[error("there is no {what} {which:?} in this {within}")]
     NotFound {
+        /// kind of thing that it would be in
+        within: &'static str,
         /// kind of thing
         what: &'static str,
         /// what the request named
@@ -90,7 +92,12 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 impl Error {
     /// A thing that the caller's project does not have.
     pub(crate) fn not_found(what: &'static str, which: impl ToString) -> Self {
-        Self::NotFound { what, which: which.to_string() }
+        Self::not_found_in("project", what, which)
+    }
+
+    /// A thing that something else, such as a session, does not have.
+    pub(crate) fn not_found_in(within: &'static str, what: &'static str, which: impl ToString) -> Self {
+        Self::NotFound { within, what, which: which.to_string() }
     }
 
     /// Status, the last part of the problem's type, and its title: the one place where errors meet HTTP.

@@ -33,13 +33,15 @@ async fn check_path(parts: &mut Parts, app: &App) -> Result<(), Error> {
     let named = RawPathParams::from_request_parts(parts, app)
         .await
         .map_err(|_| Error::NoSuchPath(parts.uri.path().to_owned()))?;
+    let mut within = "project";
     for (key, value) in &named {
         let is_no_id = key.ends_with("_id") && versioned::as_id(value).is_none();
         // what an uploaded file may be called is said where it is received
         let has_nul = value.contains('\0') && !(key == "name" && parts.method == Method::PUT);
         if is_no_id || has_nul {
-            return Err(Error::not_found(named_by(key), value));
+            return Err(Error::not_found_in(within, named_by(key), value));
         }
+        within = named_by(key);
     }
     Ok(())
 }

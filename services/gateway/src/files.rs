@@ -55,6 +55,9 @@ pub(crate) trait Owner: Send + Sync + 'static {
     /// The table that it is a row of.
     const TABLE: &'static str;
 
+    /// What it is.
+    const NOUN: &'static str;
+
     /// Its id.
     fn id(&self) -> Uuid;
 
@@ -169,17 +172,17 @@ async fn settle(
 }
 
 /// Removes a file, whether or not the caller waits for it.
-pub(crate) async fn remove(
+pub(crate) async fn remove<O: Owner>(
     app: App,
     project_id: Uuid,
-    owner: impl Owner,
+    owner: O,
     name: String,
 ) -> Result<StatusCode> {
     uninterrupted(async move {
         let mut tx = app.db.begin().await?;
         let removed = take_out(&mut tx, project_id, &owner, &name).await?;
         tx.commit().await?;
-        let key = removed.ok_or_else(|| Error::not_found("file", name))?;
+        let key = removed.ok_or_else(|| Error::not_found_in(O::NOUN, "file", name))?;
         app.store.delete(&key.parse()?).await?;
         Ok(StatusCode::NO_CONTENT)
     })

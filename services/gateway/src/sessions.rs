@@ -93,6 +93,7 @@ pub(crate) struct SessionFiles(pub Uuid);
 
 impl Owner for SessionFiles {
     const TABLE: &'static str = "sessions";
+    const NOUN: &'static str = "session";
 
     fn id(&self) -> Uuid {
         self.0

@@ -270,6 +270,28 @@ fn a_request_without_fields_takes_none() -> Result<()> {
 }
 
 #[test]
+fn a_file_that_is_not_there_is_missed_where_it_would_be() -> Result<()> {
+    let (_system, api, session) = session_with_all()?;
+    let run = api.start_run(&session, &json!({"kind": "multi-view"}))?;
+    api.make(&format!("{run}/cancel"), &json!({}))?;
+    api.make("/v1/motion-databases", &json!({"name": "walks"}))?;
+    let file = format!("{session}/files/gone.csv");
+    for (answer, expected) in [
+        (api.get(&file)?, "there is no file \"gone.csv\" in this session"),
+        (api.delete(&file)?, "there is no file \"gone.csv\" in this session"),
+        (api.get(&format!("{session}/files/%00"))?, "there is no file \"\\0\" in this session"),
+        (api.get(&format!("{run}/results/gone.csv"))?, "there is no result \"gone.csv\" in this run"),
+        (
+            api.delete("/v1/motion-databases/walks/files/gone.bvh")?,
+            "there is no file \"gone.bvh\" in this motion database",
+        ),
+    ] {
+        assert_eq!((answer.status, &answer.json()["detail"]), (404, &json!(expected)));
+    }
+    Ok(())
+}
+
+#[test]
 fn an_id_that_is_none_names_nothing() -> Result<()> {
     let system = System::start()?;
     let api = system.project("p")?;

@@ -73,7 +73,8 @@ pub(super) async fn get(
     headers: HeaderMap,
 ) -> Result<Response> {
     let results = find(&app, caller.project_id, run_id).await?;
-    let result = results.iter().find(|r| r.name == name).ok_or_else(|| Error::not_found("result", &name))?;
+    let result =
+        results.iter().find(|r| r.name == name).ok_or_else(|| Error::not_found_in("run", "result", &name))?;
     let object = Object {
         name: &result.name,
         store_key: &result.store_key,

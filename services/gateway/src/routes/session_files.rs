@@ -115,7 +115,8 @@ pub(super) async fn get(
     sessions::find(&mut db, caller.project_id, session_id, Lock::None).await?;
     let files = files::list(&mut db, session_id).await?;
     drop(db);
-    let file = files.iter().find(|f| f.name == name).ok_or_else(|| Error::not_found("file", &name))?;
+    let file =
+        files.iter().find(|f| f.name == name).ok_or_else(|| Error::not_found_in("session", "file", &name))?;
     let object = Object {
         name: &file.name,
         store_key: &file.store_key,

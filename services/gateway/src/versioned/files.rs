@@ -67,6 +67,7 @@ struct Sources<V>(Uuid, PhantomData<fn() -> V>);
 
 impl<V: Versioned> Owner for Sources<V> {
     const TABLE: &'static str = V::NOUN.sql.table;
+    const NOUN: &'static str = V::NOUN.name;
 
     fn id(&self) -> Uuid {
         self.0
