@@ -182,6 +182,20 @@ async fn what_can_not_be_solved_is_refused_with_what_was_found() {
             "tail is not on the skeleton",
         ),
         (frames(&|f| f.iter_mut().for_each(|f| f.targets.clear())), Code::InvalidArgument, "control points"),
+        (
+            frames(&|f| {
+                for position in f.iter_mut().flat_map(|f| &mut f.targets).filter_map(|t| t.position.as_mut())
+                {
+                    *position = v1::Point {
+                        x_m: 1000.0 * position.x_m,
+                        y_m: 1000.0 * position.y_m,
+                        z_m: 1000.0 * position.z_m,
+                    };
+                }
+            }),
+            Code::InvalidArgument,
+            "expected positions in metres (they are probably in millimetres)",
+        ),
         (frames(&|f| f[1].silhouettes[0].camera = "phone".into()), Code::InvalidArgument, "frame 1"),
         (frames(&|f| f[2].silhouettes[0].image = vec![1, 2]), Code::InvalidArgument, "frame 2"),
         (body(&|b| b.stature_m = Some(4.0)), Code::InvalidArgument, "stature"),

@@ -6,11 +6,15 @@ use camera_jobs::views;
 use inverse_kinematics::{Figure, Method};
 use jobs::inverse_kinematics::BodyDescription;
 use kinematics::control_points;
+use model::PointTrajectories;
 use proto::v1::{self, InverseKinematicsMethod as Wire, solve_inverse_kinematics_request::Performer};
 use service::FileError;
 use tokio_util::sync::CancellationToken;
 
-use super::{MAX_POINTS, MAX_STEPS};
+use super::{
+    MAX_POINTS, MAX_STEPS,
+    outliers::{self, Reach},
+};
 use crate::{InputError, error::CallError};
 
 /// Largest request, bytes: silhouettes as PNG take some kilobytes each.
@@ -77,7 +81,7 @@ pub(crate) fn solve(
             proto::Error::OutOfRange { field: "control points", found, expected: "1 to 16 names" }.into()
         );
     }
-    let figure = figure(request, model, names)?;
+    let figure = figure(request, model, &trajectories)?;
     let has_images = request.frames.iter().any(|frame| !frame.silhouettes.is_empty());
     let (method, wire) = method(request.method(), has_images);
     let steps = if request.steps == 0 { DEFAULT_STEPS } else { request.steps as usize };
@@ -121,8 +125,9 @@ pub(crate) fn solve(
 fn figure(
     request: &v1::SolveInverseKinematicsRequest,
     model: Option<&body::BodyModel>,
-    names: &[String],
+    trajectories: &PointTrajectories,
 ) -> Result<Figure, CallError> {
+    let names = trajectories.names();
     let figure = match (&request.performer, model) {
         (Some(Performer::Body(body)), Some(model)) => {
             let described = BodyDescription {
@@ -135,6 +140,9 @@ fn figure(
             let shape = camera_jobs::shape(model, &described)?;
             let skeleton = model.skeleton(&shape).map_err(InputError::from)?;
             let points = control_points(&skeleton, names).map_err(InputError::from)?;
+            let reach = Reach::new(&skeleton, &points, shape.measurements(model).stature_m);
+            let rows = (0..trajectories.num_frames()).map(|frame| trajectories.frame(frame).to_vec());
+            outliers::check_unit(&rows.collect::<Vec<_>>(), &reach, &points)?;
             Figure::body(model, &shape, &points)
         }
         (Some(Performer::SkeletonAsf(text)), _) => {
