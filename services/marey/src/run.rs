@@ -70,8 +70,8 @@ struct PointsArgs {
     /// What the names of the performer's markers begin with, if the file has several people, such as Anna:
     #[arg(long, value_name = "PREFIX")]
     prefix: Option<String>,
-    /// Axis of the TRC or C3D file, or of the calibration, that points up: x, y or z [default: as the file says, else y for TRC
-    /// and z for C3D]
+    /// Axis of the file of points, or of the calibration, that points up: x, y or z [default: as the file says, else z for C3D
+    /// and y for the others]
     #[arg(long, value_parser = ["x", "y", "z"], value_name = "AXIS")]
     up: Option<String>,
 }

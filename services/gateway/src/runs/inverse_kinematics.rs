@@ -39,7 +39,7 @@ pub(super) struct InverseKinematicsRun {
     /// with the program, when left out
     #[schema(example = "shipped")]
     body_model: Option<String>,
-    /// the axis of a TRC or C3D file, and of a calibration's world, that points up: `x`, `y` or `z`; what the files say when
+    /// the axis of the file of points, and of a calibration's world, that points up: `x`, `y` or `z`; what the files say when
     /// left out
     #[schema(value_type = Option<String>, example = "z")]
     up: Option<model::Axis>,

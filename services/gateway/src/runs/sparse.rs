@@ -33,7 +33,7 @@ pub(super) struct SparseRun {
     /// the motion database to learn from: id, `name` (its latest version that is ready) or `name@version`
     #[schema(example = "walks")]
     motion_database: String,
-    /// the axis of a TRC or C3D file that points up: `x`, `y` or `z`; what the file says, else y (TRC) or z (C3D), when left out
+    /// the axis of the file of points that points up: `x`, `y` or `z`; what the file says, else z (C3D) or y, when left out
     #[schema(value_type = Option<String>, example = "z")]
     up: Option<model::Axis>,
     /// metres of one unit of BVH files (their format has no unit); 0.01, centimetres, when left out
