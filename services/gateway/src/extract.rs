@@ -7,7 +7,7 @@ use axum::{
 };
 use serde::{Deserialize, de::DeserializeOwned};
 
-use crate::{App, error::Error, idempotency::RequestKey, json, query, versioned};
+use crate::{App, error::Error, idempotency::RequestKey, json, names::as_id, query};
 
 /// Largest JSON body, bytes.
 pub(crate) const MAX_JSON_BYTES: usize = 256 << 10;
@@ -35,7 +35,7 @@ async fn check_path(parts: &mut Parts, app: &App) -> Result<(), Error> {
         .map_err(|_| Error::NoSuchPath(parts.uri.path().to_owned()))?;
     let mut within = "project";
     for (key, value) in &named {
-        let is_no_id = key.ends_with("_id") && versioned::as_id(value).is_none();
+        let is_no_id = key.ends_with("_id") && as_id(value).is_none();
         // what an uploaded file may be called is said where it is received
         let has_nul = value.contains('\0') && !(key == "name" && parts.method == Method::PUT);
         if is_no_id || has_nul {

@@ -1,4 +1,6 @@
-//! Names that people give to things.
+//! Names that people give to things, and ids that the gateway gives them.
+
+use uuid::Uuid;
 
 use crate::error::{Error, Result};
 
@@ -46,7 +48,7 @@ pub(crate) fn check_versioned_name(what: &str, name: &str) -> Result<()> {
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
         && name.as_bytes()[0].is_ascii_alphanumeric()
         // an id must never be taken for a name
-        && uuid::Uuid::parse_str(name).is_err();
+        && Uuid::parse_str(name).is_err();
     if !good {
         return Err(Error::Unprocessable(format!(
             "{:?} is not a valid {what} name: expected 1 to 64 letters, digits, '.', '_' or '-', beginning with \
@@ -73,6 +75,11 @@ pub(crate) fn media_type(name: &str) -> &'static str {
         Some("tar") => "application/x-tar",
         _ => "application/octet-stream",
     }
+}
+
+/// An id as it is given out: other ways to write one are not taken, so that a thing has one address.
+pub(crate) fn as_id(text: &str) -> Option<Uuid> {
+    Uuid::try_parse(text).ok().filter(|id| id.as_hyphenated().to_string().eq_ignore_ascii_case(text))
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use crate::{
     access::Access,
     error::{Error, Result},
     lock::Lock,
+    names::as_id,
 };
 
 /// Which versions of a name are meant when none is named.
@@ -51,11 +52,6 @@ pub(crate) async fn find<V: Versioned>(
         Lock::Update => V::NOUN.sql.find_for_update,
     };
     sqlx::query_as(query).bind(id).bind(project_id).fetch_optional(db).await?.ok_or_else(not_found)
-}
-
-/// An id as it is given out: other ways to write one are not taken, so that a thing has one address.
-pub(crate) fn as_id(text: &str) -> Option<Uuid> {
-    Uuid::try_parse(text).ok().filter(|id| id.as_hyphenated().to_string().eq_ignore_ascii_case(text))
 }
 
 /// A version as it is given out: no sign, no leading zero.

@@ -16,6 +16,6 @@ pub(crate) use body_model::{BodyModel, NewBodyModel};
 pub(crate) use contents::{Augment, MotionDatabaseDetails, augment, details, gplvm};
 pub(crate) use files::{delete_file, list_files, put_file};
 pub(crate) use life::{create, delete, list};
-pub(crate) use lookup::{Latest, as_id, find, look};
+pub(crate) use lookup::{Latest, find, look};
 pub(crate) use motion_database::{Clip, MotionDatabase, NewMotionDatabase, clips, left_out};
 pub(crate) use noun::{Version, Versioned, set_build};
