@@ -1,6 +1,6 @@
 //! What the queue refuses, and why attempts at jobs fail.
 
-use crate::{JobId, RunId, RunState};
+use crate::{JobId, RunId, RunState, UnknownState};
 
 /// What can go wrong in a call to the queue.
 #[derive(Debug, thiserror::Error)]
@@ -52,13 +52,8 @@ pub enum Error {
     #[error("on_complete: {0}")]
     OnComplete(#[source] JobError),
     /// A word in the database that this version does not know.
-    #[error("unknown state {found:?}, expected one of {expected}")]
-    UnknownState {
-        /// The word.
-        found: String,
-        /// The known words.
-        expected: &'static str,
-    },
+    #[error(transparent)]
+    UnknownState(#[from] UnknownState),
 }
 
 impl Error {

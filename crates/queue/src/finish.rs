@@ -220,7 +220,7 @@ pub(crate) async fn lock_existing_run(
         .bind(run_id)
         .fetch_optional(connection)
         .await?;
-    state.map(|state| state.parse()).transpose()
+    Ok(state.map(|state| state.parse()).transpose()?)
 }
 
 /// With the run locked: ends it, cancels what waits and flags what runs.

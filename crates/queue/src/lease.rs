@@ -2,7 +2,7 @@
 
 use sqlx::PgConnection;
 
-use crate::{Error, JobId, LeaseNumber, channels};
+use crate::{Error, JobId, LeaseNumber, UnknownState, channels};
 
 /// A sign of life for one job.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,19 +48,19 @@ pub async fn heartbeat(connection: &mut PgConnection, beats: &[Beat]) -> Result<
     if !moved.is_empty() {
         update_run_progress(connection, &moved).await?;
     }
-    answers.into_iter().map(BeatAnswer::try_from).collect()
+    answers.into_iter().map(|word| Ok(BeatAnswer::try_from(word)?)).collect()
 }
 
 impl TryFrom<String> for BeatAnswer {
-    type Error = Error;
+    type Error = UnknownState;
 
-    fn try_from(word: String) -> Result<Self, Error> {
+    fn try_from(word: String) -> Result<Self, UnknownState> {
         match word.as_str() {
             "held" => Ok(Self::Held),
             "busy" => Ok(Self::Busy),
             "cancelled" => Ok(Self::Cancelled),
             "lost" => Ok(Self::Lost),
-            _ => Err(Error::UnknownState { found: word, expected: "held, busy, cancelled, lost" }),
+            _ => Err(UnknownState { found: word, expected: "held, busy, cancelled, lost" }),
         }
     }
 }

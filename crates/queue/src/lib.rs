@@ -78,7 +78,7 @@ pub use read::{Depth, InputArtefact, dependency_artefacts, depth, run_results};
 pub use reap::{Reaped, reap};
 pub use run::{NewRun, RunStatus, cancel_run, enqueue_run, run_status};
 pub use settings::{heartbeat_interval, set_staleness, staleness};
-pub use state::{JobState, RunState};
+pub use state::{JobState, RunState, UnknownState};
 pub use worker::{Handler, JobContext, Outcome, Worker, WorkerBuilder, WorkerHandle};
 
 /// The schema of the whole system, `migrations/` in the repository.

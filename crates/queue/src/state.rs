@@ -5,7 +5,15 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
+/// A word in the database that this version does not know.
+#[derive(Debug, thiserror::Error)]
+#[error("unknown state {found:?}, expected one of {expected}")]
+pub struct UnknownState {
+    /// The word.
+    pub found: String,
+    /// The known words.
+    pub expected: &'static str,
+}
 
 macro_rules! states {
     ($(#[$doc:meta])* $name:ident, $known:literal { $($(#[$variant_doc:meta])* $variant:ident = $word:literal),* $(,)? }) => {
@@ -33,20 +41,20 @@ macro_rules! states {
         }
 
         impl FromStr for $name {
-            type Err = Error;
+            type Err = UnknownState;
 
-            fn from_str(word: &str) -> Result<Self, Error> {
+            fn from_str(word: &str) -> Result<Self, UnknownState> {
                 match word {
                     $($word => Ok(Self::$variant),)*
-                    _ => Err(Error::UnknownState { found: word.to_owned(), expected: $known }),
+                    _ => Err(UnknownState { found: word.to_owned(), expected: $known }),
                 }
             }
         }
 
         impl TryFrom<String> for $name {
-            type Error = Error;
+            type Error = UnknownState;
 
-            fn try_from(word: String) -> Result<Self, Error> {
+            fn try_from(word: String) -> Result<Self, UnknownState> {
                 word.parse()
             }
         }

@@ -18,7 +18,19 @@ impl FileUse {
     /// By the file's name, with its folders or without, and without the ending of a compression (see
     /// [`crate::archive::without_compression`]); what systems hide in archives is of no use.
     pub fn from_name(name: &str) -> Self {
-        Path::from_name(name).file_use()
+        Self::from_path(&Path::from_name(name))
+    }
+
+    /// The same for a name that is taken apart.
+    pub(super) fn from_path(path: &Path<'_>) -> Self {
+        if path.is_hidden() {
+            return Self::None;
+        }
+        // A BVH has a skeleton too, but is there for its motion.
+        let motion = || MotionFormat::from_extension(path.extension).map(Self::Motion);
+        let skeleton = || SkeletonFormat::from_extension(path.extension).map(Self::Skeleton);
+        let is_index = path.stem.eq_ignore_ascii_case("index") && path.extension.eq_ignore_ascii_case("csv");
+        motion().or_else(skeleton).or(is_index.then_some(Self::Index)).unwrap_or(Self::None)
     }
 }
 

@@ -27,7 +27,7 @@ impl<'e> Indices<'e> {
     pub(super) fn read(files: &[(Path<'e>, &'e Entry)]) -> Result<Self> {
         let mut list = Vec::new();
         for (path, entry) in files {
-            if path.file_use() == FileUse::Index {
+            if FileUse::from_path(path) == FileUse::Index {
                 let rows = rows(&entry.bytes).map_err(|e| e.in_file(&entry.name))?;
                 list.push((path.folder, rows));
             }

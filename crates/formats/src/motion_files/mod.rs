@@ -86,7 +86,7 @@ pub fn clips(entries: &[Entry], options: &Options) -> Result<Read<Vec<MotionFile
     let mut names = Names::default();
     let mut clips = Vec::new();
     for (path, entry) in &files {
-        let FileUse::Motion(format) = path.file_use() else { continue };
+        let FileUse::Motion(format) = FileUse::from_path(path) else { continue };
         let row = indices.row(path);
         let read = format.read_alone(&entry.bytes, &options.bvh).unwrap_or_else(|| {
             let stated = row.and_then(|r| r.frame_rate).or_else(|| amc::stated_frame_rate(&entry.bytes));

@@ -1,13 +1,10 @@
-use super::FileUse;
-use crate::session::{MotionFormat, SkeletonFormat};
-
 /// A name in an archive, taken apart.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Path<'e> {
     pub(super) folder: &'e str,
     /// without folders and ending
     pub(super) stem: &'e str,
-    extension: &'e str,
+    pub(super) extension: &'e str,
 }
 
 impl<'e> Path<'e> {
@@ -15,17 +12,6 @@ impl<'e> Path<'e> {
         let (folder, file) = name.rsplit_once('/').unwrap_or(("", name));
         let (stem, extension) = file.rsplit_once('.').unwrap_or((file, ""));
         Self { folder, stem, extension }
-    }
-
-    pub(super) fn file_use(&self) -> FileUse {
-        if self.is_hidden() {
-            return FileUse::None;
-        }
-        // A BVH has a skeleton too, but is there for its motion.
-        let motion = || MotionFormat::from_extension(self.extension).map(FileUse::Motion);
-        let skeleton = || SkeletonFormat::from_extension(self.extension).map(FileUse::Skeleton);
-        let is_index = self.stem.eq_ignore_ascii_case("index") && self.extension.eq_ignore_ascii_case("csv");
-        motion().or_else(skeleton).or(is_index.then_some(FileUse::Index)).unwrap_or(FileUse::None)
     }
 
     /// Files that some systems add to archives, `._16_15.amc` and those in `__MACOSX`.

@@ -19,7 +19,7 @@ pub(super) struct Skeletons<'e> {
 impl<'e> Skeletons<'e> {
     /// Of skeletons of one name the first in the order of `files` is taken.
     pub(super) fn new(files: &[(Path<'e>, &'e Entry)]) -> Self {
-        let lazy = |(path, entry): &(Path<'e>, &'e Entry)| match path.file_use() {
+        let lazy = |(path, entry): &(Path<'e>, &'e Entry)| match FileUse::from_path(path) {
             FileUse::Skeleton(format) => Some(LazySkeleton { format, entry, file: OnceCell::new() }),
             _ => None,
         };
