@@ -28,14 +28,13 @@ impl Wanted {
     /// [`Error::Wanted`].
     pub fn check(&self) -> Result<()> {
         let ranges = [
-            ("stature", self.stature_m, 1.0, 2.4, "m"),
-            ("mass", self.mass_kg, 20.0, 250.0, "kg"),
-            ("age", self.age_years, 0.0, 120.0, "years"),
+            ("stature_m", self.stature_m, 1.0, 2.4),
+            ("mass_kg", self.mass_kg, 20.0, 250.0),
+            ("age_years", self.age_years, 0.0, 120.0),
         ];
-        for (name, value, low, high, unit) in ranges {
+        for (name, value, low, high) in ranges {
             if let Some(value) = value.filter(|value| !(low..=high).contains(value)) {
-                let value = shown(value);
-                let what = format!("{name} of {value} {unit} was asked for, expected {low} to {high}");
+                let what = format!("{name} is {}, expected {low} to {high}", shown(value));
                 return Err(Error::Wanted { what });
             }
         }

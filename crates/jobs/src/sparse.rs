@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// The kind of such runs.
-pub const RUN_KIND: &str = "reconstruction";
+pub const RUN_KIND: &str = "sparse";
 
 /// Reads a session's files and plans its chunks. Taken by the reconstruction service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

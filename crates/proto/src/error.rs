@@ -74,6 +74,8 @@ pub enum ErrorCode {
     TooLarge,
     /// Something the service needs is away; try again.
     Unavailable,
+    /// The client let too much time pass.
+    TimedOut,
     /// The client went away.
     Cancelled,
     /// An internal error.
@@ -101,7 +103,11 @@ pub fn status(error: &impl CallError) -> Status {
         ErrorCode::Unavailable | ErrorCode::NotReady => {
             tracing::warn!(error = ?error, "call can't be answered now");
         }
-        ErrorCode::InvalidInput | ErrorCode::NotFound | ErrorCode::TooLarge | ErrorCode::Cancelled => {}
+        ErrorCode::InvalidInput
+        | ErrorCode::NotFound
+        | ErrorCode::TooLarge
+        | ErrorCode::TimedOut
+        | ErrorCode::Cancelled => {}
     }
     Status::new(Code::from(code), error.to_string())
 }
@@ -114,6 +120,7 @@ impl From<ErrorCode> for Code {
             ErrorCode::NotReady => Self::FailedPrecondition,
             ErrorCode::TooLarge => Self::ResourceExhausted,
             ErrorCode::Unavailable => Self::Unavailable,
+            ErrorCode::TimedOut => Self::DeadlineExceeded,
             ErrorCode::Cancelled => Self::Cancelled,
             ErrorCode::Internal => Self::Internal,
         }
@@ -147,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn clients_are_told_everything_but_faults_of_ours() {
+    fn clients_are_told_everything_but_internal_errors() {
         let told = |code| {
             let status = status(&Failed(code));
             (status.code(), status.message().to_owned())
@@ -159,6 +166,7 @@ mod tests {
             (ErrorCode::NotReady, Code::FailedPrecondition),
             (ErrorCode::TooLarge, Code::ResourceExhausted),
             (ErrorCode::Unavailable, Code::Unavailable),
+            (ErrorCode::TimedOut, Code::DeadlineExceeded),
             (ErrorCode::Cancelled, Code::Cancelled),
         ] {
             assert_eq!(told(code), (expected, "shard 3 of 2".to_owned()));

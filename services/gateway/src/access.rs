@@ -7,7 +7,7 @@ use serde::Serialize;
 use sqlx::{PgConnection, PgPool};
 use uuid::Uuid;
 
-use crate::{App, error::Error};
+use crate::{App, error::Error, names};
 
 /// What a key may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, utoipa::ToSchema)]
@@ -50,6 +50,15 @@ impl std::str::FromStr for Scope {
             .find(|scope| scope.as_str() == word)
             .ok_or_else(|| format!("unknown scope {word:?}, expected read, write or admin"))
     }
+}
+
+/// A project's name as it may be: letters, digits, `.`, `_` and `-`.
+///
+/// # Errors
+/// A text that is none, with what is expected.
+pub fn project_name(name: &str) -> Result<String, String> {
+    names::check_versioned_name("project", name).map_err(|error| error.to_string())?;
+    Ok(name.to_owned())
 }
 
 /// Makes an API key for a project, and the project when there is none of that name. The key itself is returned

@@ -90,6 +90,14 @@ pub enum Error {
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
+    /// The same refusal of a request, with what led to it in front.
+    pub(crate) fn because(self, reason: &str) -> Self {
+        match self {
+            Self::Unprocessable(what) => Self::Unprocessable(format!("{reason}{what}")),
+            other => other,
+        }
+    }
+
     /// A thing that the caller's project does not have.
     pub(crate) fn not_found(what: &'static str, which: impl ToString) -> Self {
         Self::not_found_in("project", what, which)

@@ -46,15 +46,16 @@ pub(crate) fn check_file_name(name: &str) -> Result<()> {
 pub(crate) fn check_versioned_name(what: &str, name: &str) -> Result<()> {
     let good = (1..=64).contains(&name.len())
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
-        && name.as_bytes()[0].is_ascii_alphanumeric()
-        // an id must never be taken for a name
-        && Uuid::parse_str(name).is_err();
+        && name.as_bytes()[0].is_ascii_alphanumeric();
     if !good {
         return Err(Error::Unprocessable(format!(
             "{:?} is not a valid {what} name: expected 1 to 64 letters, digits, '.', '_' or '-', beginning with \
              a letter or digit",
             name.chars().take(80).collect::<String>()
         )));
+    }
+    if Uuid::parse_str(name).is_ok() {
+        return Err(Error::Unprocessable(format!("{name:?} is an id, which can't be the name of a {what}")));
     }
     Ok(())
 }

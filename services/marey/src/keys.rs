@@ -31,7 +31,7 @@ pub enum Command {
 #[derive(Debug, clap::Args)]
 pub struct CreateArgs {
     /// Name of the project: letters, digits, '.', '_' and '-'
-    #[arg(long)]
+    #[arg(long, value_parser = access::project_name)]
     project: String,
     /// What the key allows: read, write, admin
     #[arg(long, value_delimiter = ',', default_value = "read,write")]

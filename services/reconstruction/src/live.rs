@@ -3,11 +3,13 @@
 //! A stream has a thread of its own that computes, and two bounded queues: frames in, poses out. How many streams there
 //! are is limited. Nothing is kept here: a stream goes on anywhere from the states that it gives out.
 
+mod end;
 mod queue;
 mod start;
 mod stream;
 
 use crate::{Shared, config::LiveConfig, error::CallError};
+use end::StreamEnd;
 use library::Cache;
 use motion_db::ControlTable;
 use proto::v1::{self, live_request, live_server};
@@ -65,10 +67,9 @@ impl live_server::Live for LiveRpc {
         let slot = self.slot()?;
         let mut requests = request.into_inner();
         let first = tokio::time::timeout(START_WAIT, requests.message()).await;
-        let first =
-            first.map_err(|_| Status::deadline_exceeded("no start message arrived within 10 seconds"))??;
+        let first = first.map_err(|_| StreamEnd::NoStart(START_WAIT))??;
         let Some(live_request::Message::Start(start)) = first.and_then(|first| first.message) else {
-            return Err(Status::invalid_argument("the first message is not a start"));
+            return Err(StreamEnd::NotAStart.into());
         };
         let start = self.prepare(start).await?;
         let responses = stream::open(start, requests, slot, &self.config, self.shutdown.clone()).await?;

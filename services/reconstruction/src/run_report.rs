@@ -22,9 +22,10 @@ struct Own<'a> {
 
 #[derive(Serialize)]
 struct Summary {
-    mean_residual_m: f64,
-    max_residual_m: f64,
-    mean_sigma_rad: f64,
+    /// Over the frames in which something was measured; none without such.
+    mean_residual_m: Option<f64>,
+    max_residual_m: Option<f64>,
+    mean_sigma_rad: Option<f64>,
     frames_without_measurement: usize,
 }
 
@@ -85,12 +86,14 @@ fn doubts(quality: &[FrameQuality], lost_energy: f64) -> Vec<String> {
 }
 
 fn summary(quality: &[FrameQuality]) -> Summary {
-    let count = quality.len().max(1) as f64;
+    let residuals: Vec<f64> =
+        quality.iter().filter(|q| q.measured_points > 0).map(|q| q.residual_m).collect();
+    let mean = |sum: f64, count: usize| (count > 0).then(|| sum / count as f64);
     Summary {
-        mean_residual_m: quality.iter().map(|q| q.residual_m).sum::<f64>() / count,
-        max_residual_m: quality.iter().map(|q| q.residual_m).fold(0.0, f64::max),
-        mean_sigma_rad: quality.iter().map(|q| q.sigma_rad).sum::<f64>() / count,
-        frames_without_measurement: quality.iter().filter(|q| q.measured_points == 0).count(),
+        mean_residual_m: mean(residuals.iter().sum(), residuals.len()),
+        max_residual_m: residuals.iter().copied().reduce(f64::max),
+        mean_sigma_rad: mean(quality.iter().map(|q| q.sigma_rad).sum(), quality.len()),
+        frames_without_measurement: quality.len() - residuals.len(),
     }
 }
 
@@ -100,6 +103,15 @@ mod tests {
 
     fn frame(energy: f64, measured_points: usize) -> FrameQuality {
         FrameQuality { residual_m: 0.0, sigma_rad: 0.1, energy, neighbour_distance_deg: 3.0, measured_points }
+    }
+
+    #[test]
+    fn frames_without_measurement_do_not_better_the_residual() {
+        let measured = FrameQuality { residual_m: 0.002, ..frame(1.0, 4) };
+        let found = summary(&[vec![measured; 10], vec![frame(0.0, 0); 30]].concat());
+        assert!((found.mean_residual_m.unwrap() - 0.002).abs() < 1e-12);
+        assert_eq!(found.frames_without_measurement, 30);
+        assert_eq!(summary(&[frame(0.0, 0)]).mean_residual_m, None);
     }
 
     #[test]

@@ -91,7 +91,7 @@ impl Fixture {
     }
 
     async fn enqueue(&self, request: &PlanSparse) -> RunId {
-        self.sandbox.enqueue("reconstruction", Some(self.session), request).await
+        self.sandbox.enqueue("sparse", Some(self.session), request).await
     }
 
     async fn succeeded(&self, run: RunId) -> BTreeMap<String, Artefact> {

@@ -118,6 +118,24 @@ fn the_kind_follows_from_the_files_when_it_is_left_out() -> Result<()> {
         (&both, json!({"kind": "inverse-kinematics"}), 202, "inverse-kinematics"),
         (
             &both,
+            json!({"inverse_kinematics": {}, "parameters": {"particles": 9}}),
+            422,
+            "parameters.particles is not for inverse kinematics, which takes first_frame, num_frames",
+        ),
+        (
+            &both,
+            json!({"kind": "multi-view", "parameters": {"particles": 1}}),
+            422,
+            "parameters.particles is 1, expected",
+        ),
+        (
+            &both,
+            json!({"kind": "multi-view", "background": "plate", "parameters": {"background": {"model": "mixture"}}}),
+            422,
+            "background is given twice",
+        ),
+        (
+            &both,
             json!({"kind": "dance"}),
             422,
             "kind is \"dance\", expected sparse, multi-view or inverse-kinematics",
@@ -316,18 +334,15 @@ fn a_body_that_nobody_has_is_refused_before_there_is_a_run() -> Result<()> {
     let api = system.project("p")?;
     let session = api.session("s", &[POINTS])?;
     for (options, expected) in [
-        (json!({"stature_m": 0}), "inverse_kinematics: stature of 0 m was asked for, expected 1 to 2.4"),
-        (json!({"stature_m": 178}), "inverse_kinematics: stature of 178 m was asked for, expected 1 to 2.4"),
-        (json!({"mass_kg": -70}), "inverse_kinematics: mass of -70 kg was asked for, expected 20 to 250"),
-        (json!({"age_years": 400}), "inverse_kinematics: age of 400 years was asked for, expected 0 to 120"),
+        (json!({"stature_m": 0}), "inverse_kinematics.stature_m is 0, expected 1 to 2.4"),
+        (json!({"stature_m": 178}), "inverse_kinematics.stature_m is 178, expected 1 to 2.4"),
+        (json!({"mass_kg": -70}), "inverse_kinematics.mass_kg is -70, expected 20 to 250"),
+        (json!({"age_years": 400}), "inverse_kinematics.age_years is 400, expected 0 to 120"),
         (
             json!({"alpha": [0, 99]}),
             "inverse_kinematics.alpha[1] is 99, expected -6 to 6 standard deviations",
         ),
-        (
-            json!({"stature_m": 1e308}),
-            "inverse_kinematics: stature of 1e308 m was asked for, expected 1 to 2.4",
-        ),
+        (json!({"stature_m": 1e308}), "inverse_kinematics.stature_m is 1e308, expected 1 to 2.4"),
         (
             json!({"alpha": [-1e308]}),
             "inverse_kinematics.alpha[0] is -1e308, expected -6 to 6 standard deviations",

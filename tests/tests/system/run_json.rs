@@ -178,7 +178,7 @@ fn sparse(api: &Api) -> Result<Expected> {
     let run = api.start_run(&session, &json!({"motion_database": "walks"}))?;
     let (files, learned_from) = (files(api, &session)?, &["motion_database"]);
     let stages = &["plan", "chunks", "merge"];
-    Ok(Expected { run, kind: "reconstruction", subject: "session", files, learned_from, stages })
+    Ok(Expected { run, kind: "sparse", subject: "session", files, learned_from, stages })
 }
 
 fn multi_view(api: &Api, track: bool, stages: &'static [&'static str]) -> Result<Expected> {

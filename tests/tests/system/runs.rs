@@ -114,7 +114,7 @@ fn a_run_is_cancelled_before_it_begins() -> Result<()> {
     assert_eq!(api.wait(&run)?["state"], "cancelled");
     assert_eq!(api.make(&format!("{run}/cancel"), &json!({}))?["state"], "cancelled", "again is no error");
     assert_eq!(api.delete(&session)?.status, 204);
-    assert_eq!(api.delete("/v1/motion-databases/walks")?.status, 204);
+    assert_eq!(api.delete("/v1/motion-databases/walks@1")?.status, 204);
     Ok(())
 }
 

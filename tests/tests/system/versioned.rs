@@ -139,7 +139,11 @@ fn files_are_fixed_from_the_build_on_until_it_has_failed() -> Result<()> {
         assert_eq!(api.make(&format!("{run}/cancel"), &json!({}))?["state"], "cancelled");
         assert_eq!(api.get(&path)?.json()["state"], "failed");
         assert_eq!(api.put(&file, b"x")?.status, 200, "it collects files again");
-        assert_eq!((api.delete(&path)?.status, api.delete(&path)?.status), (204, 404));
+        let unclear = api.delete(&path)?;
+        assert_eq!(unclear.status, 422);
+        assert!(detail(&unclear).ends_with("name the one to delete, such as a@1"), "{}", detail(&unclear));
+        let version = format!("{path}@1");
+        assert_eq!((api.delete(&version)?.status, api.delete(&version)?.status), (204, 404));
         assert_eq!(api.get(&run)?.status, 404, "its build is of no use without it");
         assert_eq!(system.num_objects(), 0);
         Ok(())

@@ -93,7 +93,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let downloads = Downloads { client: &client, folder: tempfile::tempdir()? };
     match run.kind.as_str() {
-        "reconstruction" => {}
+        "sparse" => {}
         "multi-view" | "inverse-kinematics" => return joints(args, &downloads, &run),
         kind => bail!("run {} is of kind {kind}, which produces no motion", run.id),
     }

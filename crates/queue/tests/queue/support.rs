@@ -112,7 +112,7 @@ pub fn quick(builder: WorkerBuilder) -> WorkerBuilder {
 }
 
 pub fn new_run(project_id: ProjectId) -> NewRun<'static> {
-    NewRun { project_id, kind: "reconstruction", session_id: None, parameters: json!({ "points": 6 }) }
+    NewRun { project_id, kind: "sparse", session_id: None, parameters: json!({ "points": 6 }) }
 }
 
 /// Kinds of jobs that are given whatever a test likes.

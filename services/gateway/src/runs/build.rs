@@ -47,9 +47,10 @@ pub(crate) async fn build<B: Build>(by: &Access, which: &str, posted: Posted<B>)
     let row: B::Row = versioned::find(&mut tx, project_id, which, Latest::Any, Lock::Update).await?;
     if !row.version().collects() {
         return Err(Error::Conflict(format!(
-            "{} is {}; make a new version to build another",
+            "{} is {}; {} to build another",
             row.title(),
-            row.version().state
+            row.version().state,
+            row.version().way_to_another()
         )));
     }
     let files = files::inputs(&mut tx, row.id()).await?;

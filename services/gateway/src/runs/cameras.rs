@@ -17,6 +17,7 @@ use crate::{
     error::{Error, Result},
     json,
     lock::Lock,
+    refusal::one_of,
     versioned::{self, BodyModel, Latest},
 };
 
@@ -42,7 +43,8 @@ pub(super) struct CameraFields {
     /// further parameters, by name, among others: `track` (false: the body in the first frame alone), `first_frame`,
     /// `num_frames`, `frame_rate` (where no video tells it), `chunk_frames` and `overlap_frames` (frames that are tracked in
     /// one piece, and that it goes on into the next), `particles` (0: none), `iterations`, `prior` and `seed` of the search
-    /// for limbs that do not fit, `texture` (points are followed in the pictures), `overlay` (a video of each camera)
+    /// for limbs that do not fit, `texture` (points are followed in the pictures), `overlay` (a video of each camera); runs
+    /// by inverse kinematics take `first_frame`, `num_frames`, `largest_side`, `frame_rate` and `background` alone
     #[schema(example = json!({"chunk_frames": 150, "particles": 25}))]
     parameters: Map<String, Value>,
 }
@@ -65,6 +67,18 @@ impl CameraFields {
         self.resolve().map(drop)
     }
 
+    /// Refuses parameters of what comes after the silhouettes, for runs that end with these.
+    pub fn check_for_silhouettes(&self) -> Result<()> {
+        let mut given = self.parameters.iter().filter(|(_, value)| !value.is_null());
+        match given.find(|(name, _)| !Parameters::OF_SILHOUETTES.contains(&name.as_str())) {
+            None => Ok(()),
+            Some((name, _)) => Err(Error::Unprocessable(format!(
+                "parameters.{name} is not for inverse kinematics, which takes {} of a camera run's parameters",
+                one_of(&Parameters::OF_SILHOUETTES)
+            ))),
+        }
+    }
+
     /// The first field that is given, if any is.
     pub fn first_given(&self) -> Result<Option<String>> {
         let (given, default) = (serde_json::to_value(self)?, serde_json::to_value(Self::default())?);
@@ -74,9 +88,13 @@ impl CameraFields {
 
     /// All parameters, those left out with their defaults.
     fn resolve(&self) -> Result<Parameters> {
-        let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
+        let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters.{error}"));
         let mut parameters: Parameters = json::read_parameters(self.parameters.clone())?;
         if let Some(kind) = &self.background {
+            if self.parameters.get("background").is_some_and(|given| given.get("model").is_some()) {
+                let what = "background is given twice: as a field and in parameters";
+                return Err(Error::Unprocessable(what.into()));
+            }
             parameters.background.model = serde_json::from_value(kind.as_str().into()).map_err(|_| {
                 Error::Unprocessable(format!(
                     "background is {kind:?}, expected auto, plate, adaptive or mixture"

@@ -123,6 +123,7 @@ impl SessionRun for InverseKinematicsRun {
         let session_id = on.session.id;
         if solver.uses_images() {
             self.cameras.check()?;
+            self.cameras.check_for_silhouettes()?;
         } else if let Some(field) = self.cameras.first_given()? {
             return Err(Error::Unprocessable(format!(
                 "{field} is for runs that use cameras, and this one uses none; upload a calibration and what the cameras \
@@ -164,7 +165,7 @@ impl InverseKinematicsRequest {
         let refuse = |what: String| Err(Error::Unprocessable(what));
         let (stature_m, mass_kg, age_years) = (self.stature_m, self.mass_kg, self.age_years);
         let wanted = Wanted { stature_m, mass_kg, age_years, sex: self.sex()? };
-        wanted.check().map_err(|error| Error::Unprocessable(format!("inverse_kinematics: {error}")))?;
+        wanted.check().map_err(|error| Error::Unprocessable(format!("inverse_kinematics.{error}")))?;
         if self.alpha.is_empty() {
             return Ok(());
         }
@@ -210,7 +211,7 @@ impl InverseKinematicsRequest {
             None if has_cameras => Ok(Method::ImageConstrained),
             None => Ok(Method::Priority),
             Some(solver) if solver.uses_images() && !has_cameras => Err(Error::Unprocessable(format!(
-                "solver is {:?}, which needs silhouettes; upload a calibration and what the cameras saw, or choose plain or \
+                "inverse_kinematics.solver is {:?}, which needs silhouettes; upload a calibration and what the cameras saw, or choose plain or \
                  priority",
                 self.solver.as_deref().unwrap_or_default()
             ))),

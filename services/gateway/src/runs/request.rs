@@ -50,14 +50,13 @@ impl NewSessionRun {
 
     /// The run: everything that decides its result.
     pub async fn plan(self, db: &mut PgConnection, project_id: Uuid, on: OnSession) -> Result<NewRun> {
-        let asked = match self.kind {
-            Some(kind) => read(kind, "", self.fields)?,
-            None => {
-                let (kind, because) = implied(&self.fields, &on)?;
-                read(kind, &format!("{because}, so kind is {}: ", kind.name), self.fields)?
-            }
+        let Some(kind) = self.kind else {
+            let (kind, because) = implied(&self.fields, &on)?;
+            let because = format!("{because}, so kind is {}: ", kind.name);
+            let asked = read(kind, &because, self.fields)?;
+            return asked.plan(db, project_id, on).await.map_err(|error| error.because(&because));
         };
-        asked.plan(db, project_id, on).await
+        read(kind, "", self.fields)?.plan(db, project_id, on).await
     }
 }
 

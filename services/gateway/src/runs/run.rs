@@ -15,9 +15,9 @@ use crate::{
 pub(crate) struct Run {
     /// id
     pub id: Uuid,
-    /// `reconstruction`, `multi-view` (of a session with cameras), `inverse-kinematics`, `motion-database` or `body-model` (a
-    /// build), or `training`
-    #[schema(example = "reconstruction")]
+    /// `sparse`, `multi-view` or `inverse-kinematics` (of a session); `motion-database` or `body-model` (a build), or
+    /// `training` (of a motion database)
+    #[schema(example = "sparse")]
     pub kind: String,
     /// `queued`, `running`, `succeeded`, `failed` or `cancelled`
     #[schema(example = "running")]

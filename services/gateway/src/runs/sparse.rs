@@ -59,7 +59,7 @@ pub(super) struct SparseRun {
 }
 
 impl SessionRun for SparseRun {
-    const KIND: &'static str = "sparse";
+    const KIND: &'static str = sparse::RUN_KIND;
     const FILES: Option<(FileRole, &'static str)> = Some((FileRole::ControlPoints, "control points"));
     const SHARED: &'static [Shared] = &[shared::<MarkerFields>];
     const REQUIRED: Option<(&'static str, &'static str)> =

@@ -34,7 +34,7 @@ pub(crate) struct NewTraining {
 impl NewTraining {
     /// All parameters, those left out with their defaults.
     fn resolve(&self) -> Result<TrainingOptions> {
-        let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters: {error}"));
+        let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters.{error}"));
         if let Some(method) = self.method.as_ref().filter(|method| *method != "gplvm") {
             return Err(Error::Unprocessable(format!(
                 "method is {method:?}, expected \"gplvm\": no other method needs a model"

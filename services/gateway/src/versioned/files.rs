@@ -92,8 +92,9 @@ fn check_collects<V: Versioned>(row: &V) -> Result<()> {
         return Ok(());
     }
     Err(Error::Conflict(format!(
-        "{} is {}: its files are fixed; make a new version",
+        "{} is {}: its files are fixed; {}",
         row.title(),
-        row.version().state
+        row.version().state,
+        row.version().way_to_another()
     )))
 }

@@ -68,7 +68,7 @@ pub(crate) async fn list<V: Versioned>(by: &Access, page: PageQuery) -> Result<J
     page.select_ending_with(&by.app.db, V::NOUN.sql.list, by.caller.project_id, V::shipped()).await
 }
 
-/// Deletes a version that nobody needs, with its files, its builds (failed ones included) and all that they left.
+/// Deletes a version that nobody needs, named by its id or `name@version`, with its files, its builds (failed ones included) and all that they left.
 pub(crate) async fn delete<V: Versioned>(by: Access, which: String) -> Result<StatusCode> {
     let Access { app, caller: Caller { project_id, .. } } = by;
     uninterrupted(async move {
@@ -82,6 +82,13 @@ pub(crate) async fn delete<V: Versioned>(by: Access, which: String) -> Result<St
             )));
         }
         users::check_none(&mut tx, &row).await?;
+        if which == row.version().name {
+            // a request that is sent again must not delete the version before
+            return Err(Error::Unprocessable(format!(
+                "{which:?} may have several versions; name the one to delete, such as {}",
+                row.version()
+            )));
+        }
         sqlx::query(V::NOUN.sql.delete).bind(row.id()).execute(&mut *tx).await?;
         let runs: Vec<RunId> = sqlx::query_scalar(
             "DELETE FROM runs WHERE project_id = $1 AND kind = ANY($2) AND parameters->$3->>'id' = $4 RETURNING id",

@@ -13,6 +13,7 @@ use uuid::Uuid;
 use super::sql::Sql;
 use crate::{
     error::{Error, Result},
+    names::as_id,
     page::Item,
 };
 
@@ -107,11 +108,14 @@ impl Version {
         self.id.is_nil()
     }
 
+    /// What to do for another one like it.
+    pub fn way_to_another(&self) -> &'static str {
+        if self.is_shipped() { "make one of another name" } else { "make a new version" }
+    }
+
     /// Whether that is its id, its name or `name@version`.
     pub fn is_named(&self, which: &str) -> bool {
-        which == self.name
-            || which == self.to_string()
-            || Uuid::try_parse(which).is_ok_and(|id| id == self.id)
+        which == self.name || which == self.to_string() || as_id(which) == Some(self.id)
     }
 }
 

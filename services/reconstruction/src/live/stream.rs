@@ -1,6 +1,7 @@
 //! One stream: a task that takes frames, a thread that computes, a stream of answers.
 
 use super::{
+    end::StreamEnd,
     queue::{Gone, Queue},
     start::Start,
 };
@@ -147,7 +148,7 @@ struct Closed<'a>(&'a Channel);
 impl Drop for Closed<'_> {
     fn drop(&mut self) {
         self.0.frames.close();
-        let panicked = std::thread::panicking().then(|| Err(Status::internal("internal error")));
+        let panicked = std::thread::panicking().then(|| Err(CallError::Panicked.into()));
         self.0.answers.finish(panicked);
     }
 }
@@ -170,8 +171,8 @@ impl Reader {
     ) {
         let end = tokio::select! {
             end = self.read(&mut requests) => end,
-            () = shutdown.cancelled() => Status::unavailable("this service is shutting down; go on elsewhere with the last state"),
-            () = gone.cancelled() => Status::cancelled("the client is gone"),
+            () = shutdown.cancelled() => StreamEnd::ShuttingDown.into(),
+            () = gone.cancelled() => StreamEnd::ClientGone.into(),
         };
         // The thread may have ended by itself.
         let _ = ended.send(end);
@@ -182,10 +183,7 @@ impl Reader {
     async fn read(&mut self, requests: &mut Streaming<v1::LiveRequest>) -> Status {
         loop {
             let Ok(request) = tokio::time::timeout(self.channel.patience, requests.message()).await else {
-                return Status::deadline_exceeded(format!(
-                    "no frame for {} seconds",
-                    self.channel.patience.as_secs_f64()
-                ));
+                return StreamEnd::NoFrame(self.channel.patience).into();
             };
             let message = match request {
                 Ok(Some(request)) => request.message,
@@ -199,10 +197,10 @@ impl Reader {
             };
             let frame = match frame {
                 Ok(frame) => frame,
-                Err(what) => return Status::invalid_argument(what),
+                Err(what) => return StreamEnd::BadFrame(what).into(),
             };
             if self.channel.put_frame(frame).await.is_err() {
-                return Status::cancelled("the client is gone");
+                return StreamEnd::ClientGone.into();
             }
         }
     }
@@ -284,7 +282,7 @@ fn compute(
             return Vec::new();
         }
     }
-    let end = why.blocking_recv().unwrap_or_else(|_| Status::cancelled("the client is gone"));
+    let end = why.blocking_recv().unwrap_or_else(|_| StreamEnd::ClientGone.into());
     let mut answers = vec![Ok(v1::LiveResponse { message: Some(state(&live, last)) })];
     if end.code() != tonic::Code::Ok {
         answers.push(Err(end));
