@@ -68,7 +68,8 @@ pub(crate) async fn list<V: Versioned>(by: &Access, page: PageQuery) -> Result<J
     page.select_ending_with(&by.app.db, V::NOUN.sql.list, by.caller.project_id, V::shipped()).await
 }
 
-/// Deletes a version that nobody needs, named by its id or `name@version`, with its files, its builds (failed ones included) and all that they left.
+/// Deletes a version that nobody needs, named by its id or `name@version`, with its files, its builds (failed ones included)
+/// and all that they left.
 pub(crate) async fn delete<V: Versioned>(by: Access, which: String) -> Result<StatusCode> {
     let Access { app, caller: Caller { project_id, .. } } = by;
     uninterrupted(async move {
