@@ -58,15 +58,31 @@ pub struct SolveInverseKinematics {
     pub inputs: SessionInputs,
     /// The bodies that people may have.
     pub body_model: BodyModelFile,
-    /// All resolved.
+    /// All resolved. Called as in `PlanMultiView`, with which such runs begin where there are cameras: their parameters look alike.
+    #[serde(rename = "inverse_kinematics")]
     pub how: InverseKinematics,
     /// With cameras, their plan.
-    #[serde(default)]
+    #[serde(rename = "planned", default, skip_serializing_if = "Option::is_none")]
     pub cameras: Option<CamerasPlanned>,
 }
 
 impl Job for SolveInverseKinematics {
     const KIND: &'static str = "solve-inverse-kinematics";
+    const VERSION: i32 = 2;
+
+    /// Version 1 had two other names.
+    fn upgrade(version: i32, mut payload: Value) -> Option<Value> {
+        if version != 1 {
+            return None;
+        }
+        let fields = payload.as_object_mut()?;
+        for (before, now) in [("how", "inverse_kinematics"), ("cameras", "planned")] {
+            if let Some(value) = fields.remove(before) {
+                fields.insert(now.to_owned(), value);
+            }
+        }
+        Some(payload)
+    }
 }
 
 impl Request for SolveInverseKinematics {
@@ -123,12 +139,28 @@ mod tests {
         let request: SolveInverseKinematics = serde_json::from_value(json!({
             "session_id": uuid::Uuid::nil(), "files": [],
             "body_model": { "id": uuid::Uuid::nil(), "name": "shipped", "version": 1, "store_key": "", "blake3": "" },
-            "how": { "solver": "plain", "steps": 15, "points": ["head"], "marker_set": "none" },
+            "inverse_kinematics": { "solver": "plain", "steps": 15, "points": ["head"], "marker_set": "none" },
         }))
         .unwrap();
         let reading = request.reading();
         assert_eq!(reading["points"]["points"], json!(["head"]));
         assert_eq!(reading["points"]["marker_set"], "none");
         assert_eq!(request.parameters().unwrap()["points"], json!(["head"]));
+    }
+
+    #[test]
+    fn a_job_of_an_older_program_is_understood() {
+        let how = json!({ "solver": "plain", "steps": 15, "points": ["head"] });
+        let plan = json!({ "worker": "w", "attempt": 1, "seconds": 0.5, "frames": 0 });
+        let older = json!({
+            "session_id": uuid::Uuid::nil(), "files": [],
+            "body_model": { "id": uuid::Uuid::nil(), "name": "shipped", "version": 1, "store_key": "", "blake3": "" },
+            "how": how, "cameras": { "first_frame": 3, "warnings": [], "plan": plan },
+        });
+        let upgraded = SolveInverseKinematics::upgrade(1, older).unwrap();
+        let job: SolveInverseKinematics = serde_json::from_value(upgraded).unwrap();
+        assert_eq!(job.how.steps, 15);
+        assert_eq!(job.cameras.unwrap().first_frame, 3);
+        assert_eq!(SolveInverseKinematics::upgrade(3, json!({})), None);
     }
 }

@@ -17,7 +17,7 @@ pub use tracking::{DrawOverlay, FitShape, MergeTracks, TRACKED, TrackChunk, Trac
 use crate::{
     CameraChoice, SessionInputs,
     body_model::BodyModelFile,
-    inverse_kinematics::InverseKinematics,
+    inverse_kinematics::{self, InverseKinematics},
     run_json::{LearnedFrom, Request, Subject},
 };
 
@@ -49,7 +49,10 @@ impl Job for PlanMultiView {
 
 impl Request for PlanMultiView {
     fn run_kind(&self) -> &'static str {
-        RUN_KIND
+        match self.inverse_kinematics {
+            Some(_) => inverse_kinematics::RUN_KIND,
+            None => RUN_KIND,
+        }
     }
 
     fn subject(&self) -> Subject<'_> {

@@ -177,6 +177,8 @@ fn one_camera_is_enough_and_none_too() -> Result<()> {
         ensure!(end["state"] == "succeeded", "{end}");
         let report: Value = serde_json::from_str(&result(&api, &run, "run.json")?)?;
         assert_eq!(report["parameters"]["solver"], solver);
+        let shown = api.get(&run)?.json();
+        assert_eq!(shown["parameters"]["inverse_kinematics"]["solver"], solver, "with cameras and without");
         assert!(report["quality"]["mean_residual_m"].as_f64().is_some_and(|m| m < 0.01), "{report}");
     }
     let session = api.session("take", &[points])?;
