@@ -63,8 +63,17 @@ impl ZstdFrames<'_> {
         if self.rest.is_empty() {
             return Ok(false);
         }
-        self.frame = Some(StreamingDecoder::new(self.rest).map_err(io::Error::other)?);
+        self.frame = Some(StreamingDecoder::new(self.rest).map_err(|e| damage(&e))?);
         Ok(true)
+    }
+}
+
+/// What the decoder found, which it tells in words of its own code.
+fn damage(error: &impl std::fmt::Debug) -> io::Error {
+    if format!("{error:?}").contains("UnexpectedEof") {
+        io::Error::new(io::ErrorKind::UnexpectedEof, "it ends in the middle of its data")
+    } else {
+        io::Error::new(io::ErrorKind::InvalidData, "its data is damaged")
     }
 }
 
@@ -80,7 +89,7 @@ impl Read for ZstdFrames<'_> {
                 }
                 continue;
             };
-            let read = frame.read(buffer)?;
+            let read = frame.read(buffer).map_err(|e| damage(&e))?;
             if read > 0 {
                 return Ok(read);
             }

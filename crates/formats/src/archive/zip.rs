@@ -8,7 +8,13 @@ const FORMAT: &str = "zip";
 /// Files only: folders and symbolic links are skipped.
 pub(super) fn read(bytes: &[u8], unpacking: &mut Unpacking<'_>) -> Result<()> {
     let damaged = |e: ::zip::result::ZipError| Error::Damaged { format: FORMAT, message: e.to_string() };
-    let mut archive = ::zip::ZipArchive::new(Cursor::new(bytes)).map_err(damaged)?;
+    let mut archive = ::zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| match e {
+        ::zip::result::ZipError::InvalidArchive(_) => {
+            let message = "the list of its members can't be read: it is cut off or damaged".into();
+            Error::Damaged { format: FORMAT, message }
+        }
+        e => damaged(e),
+    })?;
     for index in 0..archive.len() {
         let member = archive.by_index(index).map_err(|e| {
             let place = format!("member {index}");
