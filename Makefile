@@ -6,11 +6,11 @@
 DATA ?=
 
 help: ## this list
-	@printf 'Marey: sparse motion capture to full-body motion.\n\n'
+	@printf 'Marey: full-body motion from a few measured points, or from cameras.\n\n'
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
 	@printf '\nFirst time here? `make demo` sets everything up and shows what Marey does.\n'
 
-demo: ## set up, build, reconstruct held-out trials and a person before cameras, say how well (DATA=dir: your trials)
+demo: ## set up, build, reconstruct held-out trials and a person in front of cameras, say how well (DATA=dir: your trials)
 	@scripts/demo.sh $(if $(DATA),"$(DATA)")
 
 test: ## set up, then every test; those in compose too where a Docker engine answers

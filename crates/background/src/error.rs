@@ -1,4 +1,4 @@
-use model::shown;
+use model::{counted, shown};
 
 /// Why no silhouette can be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -41,7 +41,7 @@ pub enum Error {
         height: usize,
     },
     /// Too few frames to learn from.
-    #[error("found {found} frames to learn the background from, expected at least {expected}")]
+    #[error("found {} to learn the background from, expected at least {expected}", counted(found, "frame"))]
     Sample {
         /// frames found
         found: usize,

@@ -142,7 +142,7 @@ impl fmt::Display for Advice {
             }
             Self::Jumps => {
                 "the silhouette's size jumps from frame to frame: look at the overlay; the light may flicker, or somebody \
-                 passes the person"
+                 walks past"
             }
         })
     }

@@ -1,3 +1,5 @@
+use model::counted;
+
 /// Why a body model could not be made of what was given, or a body not written.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -41,7 +43,7 @@ pub enum Error {
         what: String,
     },
     /// A population needs at least two bodies.
-    #[error("{found} scans to learn from, expected at least 2")]
+    #[error("found {} to learn from, expected at least 2", counted(found, "scan"))]
     TooFewScans {
         /// scans found
         found: usize,

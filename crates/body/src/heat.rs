@@ -5,6 +5,7 @@
 //! p_j = 1 where that bone is joint j's. A bone behind the surface is seen; one in front of it belongs to another limb and
 //! is not, which stands for the paper's test of lines of sight.
 
+use model::counted;
 use nalgebra::Vector3;
 
 use crate::{Error, Result, Rig, Skin};
@@ -26,7 +27,7 @@ pub fn heat_skin(
     joints: &[Vector3<f64>],
 ) -> Result<Skin> {
     if joints.len() != rig.num_joints() {
-        let what = format!("positions of {} joints, expected {}", joints.len(), rig.num_joints());
+        let what = format!("positions of {}, expected {}", counted(joints.len(), "joint"), rig.num_joints());
         return Err(Error::Skin { what });
     }
     let mesh = model::Mesh::new(rest.to_vec(), faces.to_vec())?;

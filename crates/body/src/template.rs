@@ -1,3 +1,4 @@
+use model::counted;
 use nalgebra::Vector3;
 
 use crate::mesh_check::check_template;
@@ -74,7 +75,7 @@ impl Template {
         };
         if regressor.num_joints() != rig.num_joints() {
             let (found, expected) = (regressor.num_joints(), rig.num_joints());
-            let what = format!("positions of {found} joints, expected the rig's {expected}");
+            let what = format!("positions of {}, expected the rig's {expected}", counted(found, "joint"));
             return Err(Error::Regressor { what });
         }
         let skin = match parts.skin {

@@ -156,7 +156,7 @@ fn check_found(alpha: &[f64]) -> Result<()> {
         return Ok(());
     }
     let what = format!(
-        "such a body is {most:.1} standard deviations from the mean, expected at most {MAX_DEVIATIONS}"
+        "those measurements are too unusual: {most:.1} standard deviations from the mean, at most {MAX_DEVIATIONS} are possible"
     );
     Err(Error::Wanted { what })
 }

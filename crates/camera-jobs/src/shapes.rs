@@ -1,5 +1,6 @@
 use body::{BodyModel, Sex, Shape, Wanted};
 use jobs::inverse_kinematics::BodyDescription;
+use model::counted;
 
 /// Largest coefficient, standard deviations.
 const MOST: f64 = 6.0;
@@ -47,7 +48,7 @@ pub fn shape(model: &BodyModel, described: &BodyDescription) -> Result<Shape, Sh
         return refuse("alpha", "given beside measurements".to_owned(), "one of the two");
     }
     if alpha.len() > model.num_components() {
-        let found = format!("{} numbers", alpha.len());
+        let found = counted(alpha.len(), "number");
         return refuse("alpha", found, "at most as many as the model has components");
     }
     if let Some(found) = alpha.iter().find(|a| a.is_nan() || a.abs() > MOST) {

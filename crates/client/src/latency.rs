@@ -1,5 +1,7 @@
 use std::fmt;
 
+use model::counted;
+
 /// How long poses took, from sending the frame to having the pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Latency {
@@ -29,7 +31,8 @@ impl Latency {
 impl fmt::Display for Latency {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.sorted.len();
-        write!(f, "{} frames, {count} poses, {} dropped", self.frames, self.dropped)?;
+        let (frames, poses) = (counted(self.frames, "frame"), counted(count, "pose"));
+        write!(f, "{frames}, {poses}, {} dropped", self.dropped)?;
         if count == 0 {
             return Ok(());
         }

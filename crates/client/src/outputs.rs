@@ -50,7 +50,7 @@ fn can_be_file(option: &str, path: &Path) -> anyhow::Result<()> {
         format!("{option}: {} can't be written, as its folder can't be opened", path.display())
     })?;
     if !found.is_dir() {
-        bail!("{option}: {} can't be written: {} is no folder", path.display(), folder.display());
+        bail!("{option}: {} can't be written: {} is not a folder", path.display(), folder.display());
     }
     Ok(())
 }
@@ -119,7 +119,7 @@ mod tests {
         for (name, expected) in [
             ("", "is a folder, expected a file"),
             ("none/x", "its folder can't be opened"),
-            ("file/x", "file is no folder"),
+            ("file/x", "file is not a folder"),
         ] {
             let error = check(&[], &[("--html", Some(&at(name)))]).unwrap_err().to_string();
             assert!(error.starts_with("--html: ") && error.contains(expected), "{error}");

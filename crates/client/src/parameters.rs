@@ -18,8 +18,8 @@ pub fn pairs(
             pair.split_once('=').with_context(|| format!("{pair:?} is not of the form {form}"))?;
         let (name, text) = (name.trim(), text.trim());
         if name.is_empty() || text.is_empty() {
-            let side = if name.is_empty() { "before" } else { "after" };
-            bail!("{pair:?} has nothing {side} the =, expected {form}");
+            let lacks = if name.is_empty() { "a name before" } else { "a value after" };
+            bail!("{pair:?} needs {lacks} \"=\": {form}");
         }
         match said.entry(name) {
             Entry::Vacant(entry) => entry.insert(value(text)),
@@ -50,9 +50,10 @@ mod tests {
         assert_eq!(Value::Object(read), json!({"neighbours": 8, "smooth": true, "mode": "a=b"}));
         let twice = values(&given(&["neighbours=8", "neighbours =9"])).unwrap_err().to_string();
         assert_eq!(twice, "\"neighbours\" is given twice, expected one NAME=VALUE for it");
-        for (pair, side) in [("=root", "before"), (" = root", "before"), ("a=", "after"), ("=", "before")] {
+        let (name, value) = ("a name before", "a value after");
+        for (pair, lacks) in [("=root", name), (" = root", name), ("a=", value), ("=", name)] {
             let message = pairs(&given(&[pair]), "MARKER=POINT", |name| name.into()).unwrap_err().to_string();
-            assert_eq!(message, format!("{pair:?} has nothing {side} the =, expected MARKER=POINT"));
+            assert_eq!(message, format!("{pair:?} needs {lacks} \"=\": MARKER=POINT"));
         }
         let word = pairs(&given(&["foo"]), "FILE=CAMERA", |name| name.into()).unwrap_err().to_string();
         assert_eq!(word, "\"foo\" is not of the form FILE=CAMERA");

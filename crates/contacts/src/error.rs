@@ -1,3 +1,5 @@
+use model::counted;
+
 /// Why feet cannot be held.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -13,7 +15,7 @@ pub enum Error {
         side: &'static str,
     },
     /// Trajectories of other frames than the motion's.
-    #[error("found {found} frames of control points, the motion has {expected}")]
+    #[error("found {} of control points, the motion has {expected}", counted(found, "frame"))]
     Frames {
         /// frames found
         found: usize,

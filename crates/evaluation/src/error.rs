@@ -1,9 +1,11 @@
+use model::counted;
+
 /// Why an evaluation cannot run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A number of control points without a set.
-    #[error("{found} control points were asked for, expected 2 to 6")]
+    #[error("{} asked for, expected 2 to 6", counted(found, "control point"))]
     Points {
         /// number asked for
         found: usize,
@@ -70,7 +72,10 @@ pub enum Error {
         source: model::Error,
     },
     /// Fewer training poses than were asked for.
-    #[error("the recordings have {found} poses, {every} seconds apart, expected at least {expected}")]
+    #[error(
+        "the recordings have {}, {every} seconds apart, expected at least {expected}",
+        counted(found, "pose")
+    )]
     TooFewPoses {
         /// poses found
         found: usize,

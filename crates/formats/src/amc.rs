@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use model::{ChannelKind, Motion, Skeleton};
+use model::{ChannelKind, Motion, Skeleton, counted};
 
 use crate::{
     Error, Place, Read, Result, asf,
@@ -202,7 +202,7 @@ fn wrong_count(line: Line<'_>, name: &[u8], expected: usize) -> Error {
     let found = words(line.text).count() - 1;
     Error::at_line(
         line.number,
-        format!("{found} values of bone {}", quote(name)),
+        format!("{} of bone {}", counted(found, "value"), quote(name)),
         format!("{expected}, one per DOF of the skeleton"),
     )
 }

@@ -8,7 +8,7 @@ use crate::session::{MotionFormat, PointsFormat, SkeletonFormat};
 
 /// What an uploaded file is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename_all = "kebab-case", try_from = "String")]
 pub enum FileRole {
     /// ASF, or a BVH whose hierarchy is used
     Skeleton,
@@ -28,7 +28,7 @@ pub enum FileRole {
     Images,
     /// an archive of silhouettes
     Masks,
-    /// a picture of the empty scene, or an archive of such
+    /// a picture of the empty scene, or an archive of such pictures
     Plate,
 }
 
@@ -39,6 +39,9 @@ const ARCHIVE: [&str; 4] = ["zip", "tar", "tgz", "tzst"];
 /// The same as people write them.
 const ARCHIVES: [&str; 4] = ["zip", "tar", "tar.gz", "tar.zst"];
 const SCAN: [&str; 5] = ["obj", "ply", "npy", "json", "csv"];
+/// Tables that go with files of something else, by name, and what is made from them.
+const LISTS: [(&str, &str); 3] =
+    [("index.csv", "motion databases"), ("scans.csv", "body models"), ("subjects.csv", "body models")];
 
 impl FileRole {
     /// All of them.
@@ -131,6 +134,71 @@ impl FileRole {
         endings(&extensions)
     }
 
+    /// What a file of a session is for: as stated, or by its name.
+    ///
+    /// # Errors
+    /// If the role is not one of sessions, or no role or not this one has files of that name.
+    pub fn in_session(name: &str, stated: Option<Self>) -> Result<Self, NotInSession> {
+        if let Some((role, made)) = stated.and_then(|role| Some((role, role.elsewhere()?))) {
+            return Err(NotInSession::Elsewhere { role, made });
+        }
+        let Some(role) = stated else {
+            if let Some((_, made)) = LISTS.into_iter().find(|(list, _)| name.eq_ignore_ascii_case(list)) {
+                return Err(NotInSession::List { name: name.to_owned(), made });
+            }
+            let guessed = Self::from_session_file(name);
+            return guessed.ok_or_else(|| NotInSession::Type { name: name.to_owned() });
+        };
+        // a role that is stated would not help where none has files of that ending
+        match Self::from_session_file(name) {
+            None => Err(NotInSession::Type { name: name.to_owned() }),
+            Some(_) if role.fits_session_file(name) => Ok(role),
+            Some(_) => Err(NotInSession::Role { name: name.to_owned(), role }),
+        }
+    }
+
+    /// So many files of this role, in words: `no file of control points`, `3 skeleton files`.
+    pub fn counted(self, count: usize) -> String {
+        let (before, after) = match self {
+            Self::Skeleton => ("skeleton ", ""),
+            Self::ControlPoints => ("", " of control points"),
+            Self::GroundTruth => ("", " of ground truth"),
+            Self::Motion => ("motion ", ""),
+            Self::Scans => ("scan ", ""),
+            Self::Calibration => ("calibration ", ""),
+            Self::Video => ("video ", ""),
+            Self::Images => ("", " of images"),
+            Self::Masks => ("", " of masks"),
+            Self::Plate => ("plate ", ""),
+        };
+        match count {
+            0 => format!("no {before}file{after}"),
+            1 => format!("1 {before}file{after}"),
+            _ => format!("{count} {before}files{after}"),
+        }
+    }
+
+    /// What a file of this role is, in words: `a skeleton`.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Skeleton => "a skeleton",
+            Self::ControlPoints => "a file of control points",
+            Self::GroundTruth => "the ground truth",
+            Self::Motion => "a file of motion",
+            Self::Scans => "a file of scans",
+            Self::Calibration => "a calibration",
+            Self::Video => "a video",
+            Self::Images => "an archive of images",
+            Self::Masks => "an archive of masks",
+            Self::Plate => "a plate",
+        }
+    }
+
+    /// The roles that files of sessions have.
+    pub fn of_sessions() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|role| role.elsewhere().is_none())
+    }
+
     /// What is made from files of this role, where they are not a session's.
     pub fn elsewhere(self) -> Option<&'static str> {
         match self {
@@ -142,8 +210,7 @@ impl FileRole {
 
     /// The endings of all files that a session can have, by role: `skeleton .asf or .bvh; …`.
     pub fn session_endings() -> String {
-        let roles = Self::ALL.into_iter().filter(|role| role.elsewhere().is_none());
-        roles.map(|role| format!("{role} {}", role.endings())).collect::<Vec<_>>().join("; ")
+        Self::of_sessions().map(|role| format!("{role} {}", role.endings())).collect::<Vec<_>>().join("; ")
     }
 
     /// Whether a file of that name is a picture, not compressed once more.
@@ -177,9 +244,46 @@ impl fmt::Display for FileRole {
     }
 }
 
+/// Why a session can't have a file.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotInSession {
+    /// No role has files of that name.
+    #[error("the type of {name:?} is not known; sessions take: {}", FileRole::session_endings())]
+    Type {
+        /// The file's name.
+        name: String,
+    },
+    /// A list that goes with files of something else.
+    #[error(
+        "{name:?} is the list that goes with files for {made}, not a file of control points; state the role if it is one"
+    )]
+    List {
+        /// The file's name.
+        name: String,
+        /// What is made from the files.
+        made: &'static str,
+    },
+    /// Other files have this role.
+    #[error("{} must be {}, found {name:?}", role.in_words(), role.endings())]
+    Role {
+        /// The file's name.
+        name: String,
+        /// The role that was stated.
+        role: FileRole,
+    },
+    /// Something else is made from files of this role.
+    #[error("role {role} belongs to {made}, not to sessions")]
+    Elsewhere {
+        /// The role that was stated.
+        role: FileRole,
+        /// What is made from such files.
+        made: &'static str,
+    },
+}
+
 /// A word that is no role.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("found role {found:?}, expected one of {}", FileRole::ALL.map(FileRole::as_str).join(", "))]
+#[error("found role {found:?}, expected one of {}", FileRole::of_sessions().map(FileRole::as_str).collect::<Vec<_>>().join(", "))]
 pub struct UnknownFileRole {
     /// The word.
     pub found: String,
@@ -245,6 +349,39 @@ mod tests {
             "{said}"
         );
         assert!(!said.contains("motion .") && !said.contains("scans ."), "{said}");
+    }
+
+    #[test]
+    fn what_a_session_does_not_take_is_said() {
+        let refused = |name: &str, stated| FileRole::in_session(name, stated).unwrap_err().to_string();
+        assert!(
+            refused("up.log", None)
+                .starts_with("the type of \"up.log\" is not known; sessions take: skeleton")
+        );
+        assert!(
+            refused("up.log", Some(FileRole::Skeleton)).starts_with("the type of \"up.log\" is not known")
+        );
+        let skeleton = refused("points.csv", Some(FileRole::Skeleton));
+        assert_eq!(skeleton, "a skeleton must be .asf or .bvh, found \"points.csv\"");
+        let motion = refused("walk.bvh", Some(FileRole::Motion));
+        assert_eq!(motion, "role motion belongs to motion databases, not to sessions");
+        assert!(refused("index.csv", None).contains("goes with files for motion databases"));
+        let points = Some(FileRole::ControlPoints);
+        assert_eq!(FileRole::in_session("index.csv", points), Ok(FileRole::ControlPoints));
+        assert_eq!(FileRole::in_session("walk.bvh", None), Ok(FileRole::GroundTruth));
+        let unknown = "banana".parse::<FileRole>().unwrap_err().to_string();
+        assert!(unknown.contains("control-points") && !unknown.contains("motion"), "{unknown}");
+    }
+
+    #[test]
+    fn files_are_counted_in_words() {
+        let points = FileRole::ControlPoints;
+        let counted = [0, 1, 3].map(|count| points.counted(count));
+        assert_eq!(
+            counted,
+            ["no file of control points", "1 file of control points", "3 files of control points"]
+        );
+        assert_eq!(FileRole::Skeleton.counted(2), "2 skeleton files");
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub mod trc;
 
 pub use bvh::Options as BvhOptions;
 pub use error::{Error, Place};
-pub use file_role::{FileRole, UnknownFileRole};
+pub use file_role::{FileRole, NotInSession, UnknownFileRole};
 pub use points::PointsOptions;
 pub use read::{Read, Warning};
 

@@ -1,5 +1,7 @@
 //! NPY: one array of numbers, as NumPy writes it.
 
+use model::counted;
+
 use crate::{Error, Result, error::at_byte, text::quote};
 
 /// An array: numbers in C order (the last index runs fastest).
@@ -53,7 +55,7 @@ pub fn read(bytes: &[u8]) -> Result<Array> {
     let count = shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side));
     let needed = count.and_then(|count| count.checked_mul(kind.bytes));
     if needed != Some(bytes.len() - end) {
-        let found = format!("{} bytes of data", bytes.len() - end);
+        let found = format!("{} of data", counted(bytes.len() - end, "byte"));
         let expected = format!("those of an array of {shape:?} numbers of {} bytes", kind.bytes);
         return Err(at_byte(end as u64, found, expected));
     }
@@ -181,7 +183,7 @@ fn from_fortran(shape: &[usize], values: &[f64]) -> Vec<f64> {
 /// If there are not as many values as the shape needs.
 pub fn write_f32(shape: &[usize], values: &[f32]) -> Result<Vec<u8>> {
     if shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) != Some(values.len()) {
-        return Err(Error::whole_file(format!("{} values", values.len()), format!("those of {shape:?}")));
+        return Err(Error::whole_file(counted(values.len(), "value"), format!("those of {shape:?}")));
     }
     let sides: String = shape.iter().map(|side| format!("{side}, ")).collect();
     let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({sides}), }}");

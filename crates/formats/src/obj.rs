@@ -1,11 +1,11 @@
 //! OBJ: meshes as text. Only positions and faces are read.
 
-use model::Mesh;
+use model::{Mesh, counted};
 use nalgebra::Vector3;
 
 use crate::{
     Error, Place, Read, Result,
-    read::{Warnings, counted},
+    read::Warnings,
     text::{Line, Lines, finite, quote, words},
 };
 

@@ -80,7 +80,7 @@ impl PointNames {
     pub(crate) fn push(&mut self, given: &str, place: Place, warnings: &mut Warnings) {
         let name = self.names.unique(given);
         if name != given {
-            warnings.add(place, format!("a second point named {given} is called {name}"));
+            warnings.add(place, format!("two points are named {given}; the second was renamed {name}"));
         }
         self.list.push(name);
     }

@@ -6,13 +6,13 @@
 
 use std::collections::HashMap;
 
-use model::{Axis, PointTrajectories};
+use model::{Axis, PointTrajectories, counted};
 use nalgebra::Vector3;
 
 use crate::{
     Error, Place, PointsOptions, Read, Result,
     points::{self, PointNames},
-    read::{Warnings, counted},
+    read::Warnings,
     text::{Line, Lines, Names, number, quote},
     time_grid::Times,
 };
@@ -63,7 +63,7 @@ pub fn read_with(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTraj
     let up = options.up.unwrap_or(Axis::Y);
     if let Some(line) = line_that_contradicts(bytes, up) {
         let message =
-            format!("says y up; it is turned from {} up all the same, as asked for", points::letter(up));
+            format!("the file says y is up; the {} that was asked for is taken instead", points::letter(up));
         warnings.add(Place::Line(line), message);
     }
     let max_frames = points::max_frames(bytes.len(), names.len());

@@ -1,12 +1,8 @@
 use std::fmt;
 
-use crate::Place;
+use model::counted;
 
-/// A number with its noun: `1 row`, `2 rows`.
-pub(crate) fn counted(count: usize, noun: &str) -> String {
-    let ending = if count == 1 { "" } else { "s" };
-    format!("{count} {noun}{ending}")
-}
+use crate::Place;
 
 /// Warnings kept per file; the rest are only counted, so that a hostile file can't fill memory with them.
 const KEPT: usize = 50;

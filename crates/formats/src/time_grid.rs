@@ -1,11 +1,11 @@
 //! From the times of rows to frames of a constant rate.
 
-use model::shown;
+use model::{counted, shown};
 
 use crate::{
     Error, Result,
     frame_rate::{decimals, from_period},
-    read::{Warnings, counted},
+    read::Warnings,
     text::{finite, quote},
 };
 
@@ -70,7 +70,7 @@ impl Times {
                 rate
             }
             None => period.ok_or_else(|| {
-                Error::at_line(first_line, "fewer than two rows", "at least two, to tell the frame rate")
+                Error::at_line(first_line, "only one row", "at least two, for the frame rate")
             })?,
         };
         let mut frames = Vec::with_capacity(self.rows.len());

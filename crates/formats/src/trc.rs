@@ -2,13 +2,13 @@
 
 use std::collections::HashMap;
 
-use model::{Axis, PointTrajectories};
+use model::{Axis, PointTrajectories, counted};
 use nalgebra::Vector3;
 
 use crate::{
     Error, Place, PointsOptions, Read, Result,
     points::{self, PointNames},
-    read::{Warnings, counted},
+    read::Warnings,
     text::{Line, Lines, Names, finite, number, push_number, quote},
     time_grid::Times,
 };
@@ -114,7 +114,7 @@ impl Rows {
         self.times.push(line.number, time)?;
         let start = self.positions.len();
         if start / self.points >= self.max_frames {
-            let found = format!("row {} of {} markers", start / self.points + 1, self.points);
+            let found = format!("row {} of {}", start / self.points + 1, counted(self.points, "marker"));
             return Err(Error::at_line(line.number, found, "rows with a cell for each coordinate"));
         }
         self.positions.resize(start + self.points, Vector3::repeat(f64::NAN));
@@ -128,7 +128,7 @@ impl Rows {
                 None if value.is_nan() => {}
                 None => {
                     let found = format!("more than {coordinates} coordinates");
-                    let expected = format!("three for each of {} markers", self.points);
+                    let expected = format!("three for each of {}", counted(self.points, "marker"));
                     return Err(Error::at_line(line.number, found, expected));
                 }
             }
@@ -206,7 +206,8 @@ impl Header {
         }
         if markers != Some(names.len() as u64) {
             let declared = markers.map_or("an unknown number of".into(), |m| m.to_string());
-            let message = format!("the file declares {declared} markers and names {}", names.len());
+            let message =
+                format!("the file declares {} and names {}", counted(declared, "marker"), names.len());
             warnings.line(line.number, message);
         }
         let axes = next_line(lines, "X1, Y1, Z1 and so on")?;
@@ -219,8 +220,10 @@ impl Header {
     fn check_rows(&self, found: usize, warnings: &mut Warnings) {
         if self.frames != Some(found as u64) {
             let declared = self.frames.map_or("an unknown number of".into(), |n| n.to_string());
-            let message =
-                format!("the file declares {declared} frames and has {found}; all {found} are read");
+            let message = format!(
+                "the file declares {} and has {found}; all {found} are read",
+                counted(declared, "frame")
+            );
             warnings.line(self.line, message);
         }
     }

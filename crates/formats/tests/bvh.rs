@@ -124,7 +124,10 @@ fn two_joints_of_one_name_are_told_apart() {
     let text = PLAIN.replace("LeftLeg", "Chest");
     let read = bvh::read(text.as_bytes(), &BvhOptions::default()).unwrap();
     assert_eq!(read.value.skeleton().joints()[3].name, "Chest_2");
-    assert_eq!(read.warnings[0].to_string(), "line 19: a second joint named Chest is called Chest_2");
+    assert_eq!(
+        read.warnings[0].to_string(),
+        "line 19: two joints are named Chest; the second was renamed Chest_2"
+    );
 }
 
 #[test]

@@ -122,7 +122,7 @@ fn a_csv_is_turned_from_the_axis_that_is_said_to_be_up() {
     assert_eq!(read.value.frame(0)[0], Vector3::new(1.0, 3.0, -2.0));
     assert_eq!(
         read.warnings[0].to_string(),
-        "line 1: says y up; it is turned from z up all the same, as asked for"
+        "line 1: the file says y is up; the z that was asked for is taken instead"
     );
     assert!(points_csv::read_with(written.as_bytes(), &options(Some(Axis::Y))).unwrap().warnings.is_empty());
 }

@@ -11,7 +11,7 @@ pub enum Error {
         channels: String,
     },
     /// No joint or standard point has that name.
-    #[error("control point {name} is not on the skeleton, expected one of: {known}")]
+    #[error("the skeleton has no {name:?}; use {known}")]
     UnknownPoint {
         /// the name asked for
         name: String,

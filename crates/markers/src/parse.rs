@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use model::counted;
 use serde::Deserialize;
 
 use crate::{Error, Group, MarkerMap, Point, Result};
@@ -123,7 +124,7 @@ fn group(point: &str, entry: GroupEntry, sigma_mm: Option<f64>) -> Result<Group>
         None => vec![1.0; entry.markers.len()],
         Some(weights) if weights.len() == entry.markers.len() => weights,
         Some(weights) => {
-            return Err(value(&what("weights"), format!("{} numbers", weights.len()), "one for each marker"));
+            return Err(value(&what("weights"), counted(weights.len(), "number"), "one for each marker"));
         }
     };
     if let Some(bad) = weights.iter().find(|w| !(1e-3..=1e3).contains(*w)) {

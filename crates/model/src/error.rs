@@ -1,4 +1,4 @@
-use crate::shown;
+use crate::{counted, shown};
 
 /// What is wrong with a skeleton, a motion or a set of trajectories.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -42,7 +42,7 @@ pub enum Error {
         name: String,
     },
     /// The number of values is not a multiple of the number of DOFs.
-    #[error("motion has {values} values, expected a multiple of the skeleton's {dofs} DOFs")]
+    #[error("motion has {}, expected a multiple of the skeleton's {dofs} DOFs", counted(values, "value"))]
     ValueCount {
         /// values found
         values: usize,
@@ -68,7 +68,7 @@ pub enum Error {
         found: f64,
     },
     /// The number of positions is not frames times points.
-    #[error("found {positions} positions, expected a multiple of {points} points")]
+    #[error("found {}, expected a multiple of {points} points", counted(positions, "position"))]
     PositionCount {
         /// positions found
         positions: usize,

@@ -1,3 +1,12 @@
+use std::fmt;
+
+/// A count with its noun: `1 trial`, `2 trials`.
+pub fn counted(count: impl fmt::Display, noun: &str) -> String {
+    let count = count.to_string();
+    let ending = if count == "1" { "" } else { "s" };
+    format!("{count} {noun}{ending}")
+}
+
 /// A number as refusals name it: a great or a tiny one by its exponent instead of hundreds of digits.
 pub fn shown(number: f64) -> String {
     let size = number.abs();
@@ -11,6 +20,11 @@ pub fn shown(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_is_singular() {
+        assert_eq!([0, 1, 2].map(|n| counted(n, "trial")), ["0 trials", "1 trial", "2 trials"]);
+    }
 
     #[test]
     fn no_number_has_hundreds_of_digits() {

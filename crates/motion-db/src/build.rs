@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use kinematics::{HEADING, Kinematics, Parametrisation, References, rotation_from_angles};
-use model::{Motion, Skeleton};
+use model::{Motion, Skeleton, counted};
 use nalgebra::Matrix3;
 
 use crate::database::{FRAME_RATE, proportions};
@@ -222,7 +222,11 @@ impl MotionDatabase {
 
 fn structure_difference(found: &Skeleton, expected: &Skeleton) -> Option<String> {
     if found.num_joints() != expected.num_joints() {
-        return Some(format!("{} joints instead of {}", found.num_joints(), expected.num_joints()));
+        return Some(format!(
+            "{} instead of {}",
+            counted(found.num_joints(), "joint"),
+            expected.num_joints()
+        ));
     }
     for (a, b) in found.joints().iter().zip(expected.joints()) {
         if a.name != b.name {

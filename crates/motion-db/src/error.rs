@@ -1,4 +1,4 @@
-use model::shown;
+use model::{counted, shown};
 
 /// Why a database cannot be built, read or asked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -94,7 +94,7 @@ pub enum Error {
         reason: String,
     },
     /// A window of a length that the database cannot have.
-    #[error("window is {found} frames, expected 1 to {max}")]
+    #[error("window is {}, expected 1 to {max}", counted(found, "frame"))]
     Window {
         /// length asked for
         found: usize,

@@ -1,5 +1,6 @@
 //! What is wrong with a message, and which status code each kind of error gets.
 
+use model::counted;
 use tonic::{Code, Status};
 
 /// A message that does not say anything sensible.
@@ -49,7 +50,7 @@ pub enum Error {
         name: String,
     },
     /// A pose has another number of values than the skeleton has degrees of freedom.
-    #[error("pose {pose} has {found} values, the skeleton has {expected} degrees of freedom")]
+    #[error("pose {pose} has {}, the skeleton has {expected} degrees of freedom", counted(found, "value"))]
     DofMismatch {
         /// Index of the pose, from 0.
         pose: usize,

@@ -23,16 +23,14 @@ pub enum FileError {
         expected: String,
     },
     /// A role that must be filled once.
-    #[error("session has {found} files of role {role}{names}, expected {expected}")]
+    #[error("the session has {}{names}; {}", role.counted(*found), if *found == 0 { "one is needed" } else { "keep one" })]
     Count {
         /// The role.
         role: FileRole,
         /// How many files.
         found: usize,
-        /// Which, in brackets.
+        /// Which, or what they could be, in brackets.
         names: String,
-        /// How many there should be.
-        expected: String,
     },
 }
 

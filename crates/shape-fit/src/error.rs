@@ -1,9 +1,11 @@
+use model::counted;
+
 /// Why no pose and shape could be found. Messages are for the person who recorded.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A body is found from two sides at least.
-    #[error("{found} cameras see the person, expected at least {least}")]
+    #[error("the person is seen by {}, expected at least {least}", counted(found, "camera"))]
     TooFewViews {
         /// cameras with a silhouette that isn't empty
         found: usize,
@@ -41,7 +43,7 @@ pub enum Error {
     /// A view doesn't agree with the others.
     #[error(
         "camera {camera} does not fit the other cameras: it sees background where they see the person. It was moved after \
-         calibration, its silhouette misses parts of the person, or it is of another moment; leave it out or repair it"
+         calibration, its silhouette misses parts of the person, or it is from a different moment; leave it out or repair it"
     )]
     ViewDisagrees {
         /// name of the camera

@@ -1,3 +1,5 @@
+use model::counted;
+
 /// Why no skeleton can be fitted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -13,7 +15,7 @@ pub enum Error {
         joints: usize,
     },
     /// Trajectories of other points than those given.
-    #[error("found trajectories of {found} points, expected {expected}")]
+    #[error("found trajectories of {}, expected {expected}", counted(found, "point"))]
     Trajectories {
         /// number found
         found: usize,

@@ -1,4 +1,4 @@
-use model::shown;
+use model::{counted, shown};
 
 /// Why a session cannot be reconstructed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -23,7 +23,7 @@ pub enum Error {
         found: String,
     },
     /// Too few or too many control points.
-    #[error("found {found} control points, expected 2 to {max}")]
+    #[error("{}{}; 2 to {max} are needed", if *found < 2 { "only " } else { "" }, counted(found, "control point"))]
     PointCount {
         /// number found
         found: usize,
@@ -39,7 +39,7 @@ pub enum Error {
     /// Points too far apart to be on one body.
     #[error(
         "control points are {spread_m:.1} m apart in half of the frames, the skeleton's legs are {leg_m:.2} m long: \
-         expected positions in metres (they may be in millimetres or centimetres)"
+         are the positions in millimetres or centimetres? They must be in metres"
     )]
     Unit {
         /// median over the frames of the widest distance, metres
@@ -67,7 +67,8 @@ pub enum Error {
     },
     /// Not enough was measured to begin with.
     #[error(
-        "session has {frames} frames with fewer than two measured control points in each, expected a frame with at least two"
+        "fewer than two control points are measured in any of {}, expected a frame with at least two",
+        counted(frames, "frame")
     )]
     NothingMeasured {
         /// frames of the session

@@ -84,7 +84,7 @@ impl fmt::Display for FarSamples {
         let Self { count, measured, point, frame, .. } = self;
         write!(
             f,
-            "{count} of {measured} measured samples are more than 100 km from the origin and are taken as not measured; the \
+            "{count} of {measured} measured samples are more than 100 km from the origin and are ignored; the \
              first: {point} in frame {frame}"
         )
     }

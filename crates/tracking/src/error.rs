@@ -1,11 +1,14 @@
-use model::shown;
+use model::{counted, shown};
 
 /// Why nothing could be tracked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A pose of another rig.
-    #[error("the pose has {found} numbers, expected {expected}, the DOFs of the rig, all finite")]
+    #[error(
+        "the pose has {}, expected {expected}, the DOFs of the rig, all finite",
+        counted(found, "number")
+    )]
     Pose {
         /// numbers of the pose
         found: usize,

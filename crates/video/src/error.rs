@@ -1,5 +1,7 @@
 use std::{io, path::PathBuf};
 
+use model::counted;
+
 /// Why frames could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -43,7 +45,10 @@ pub enum Error {
         message: String,
     },
     /// The file ends too early.
-    #[error("{path} is damaged or cut off: {found} frames came, expected {expected}; ffmpeg says: {message}")]
+    #[error(
+        "{path} is damaged or cut off: {} of {expected} could be read; ffmpeg says: {message}",
+        counted(found, "frame")
+    )]
     CutOff {
         /// the file
         path: PathBuf,
@@ -67,7 +72,7 @@ pub enum Error {
         limit: u64,
     },
     /// There are more frames than the limit.
-    #[error("{path} has {found} frames, expected at most {limit}")]
+    #[error("{path} has {}, expected at most {limit}", counted(found, "frame"))]
     TooLong {
         /// the file
         path: PathBuf,
@@ -95,13 +100,13 @@ pub enum Error {
         height: usize,
     },
     /// The flag of the options was set.
-    #[error("cancelled after {frames} frames")]
+    #[error("cancelled after {}", counted(frames, "frame"))]
     Cancelled {
         /// frames read before
         frames: u64,
     },
     /// The encoder failed.
-    #[error("{path} could not be written after {frames} frames; ffmpeg says: {message}")]
+    #[error("{path} could not be written after {}; ffmpeg says: {message}", counted(frames, "frame"))]
     Encoder {
         /// the file
         path: PathBuf,

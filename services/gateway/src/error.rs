@@ -117,8 +117,8 @@ impl Error {
             Self::NotFound { .. } | Self::NoSuchPath(_) => (S::NOT_FOUND, "not-found", "Not found"),
             Self::MethodNotAllowed(_) => (S::METHOD_NOT_ALLOWED, "method-not-allowed", "Method not allowed"),
             Self::BadRequest(_) => (S::BAD_REQUEST, "bad-request", "The request can't be read"),
-            Self::Unprocessable(_) => (S::UNPROCESSABLE_ENTITY, "unprocessable", "The request can't be done"),
-            Self::Conflict(_) => (S::CONFLICT, "conflict", "Not possible at present"),
+            Self::Unprocessable(_) => (S::UNPROCESSABLE_ENTITY, "unprocessable", "The request is not valid"),
+            Self::Conflict(_) => (S::CONFLICT, "conflict", "Conflict with the current state"),
             Self::UnsupportedMediaType(_) => {
                 (S::UNSUPPORTED_MEDIA_TYPE, "unsupported-media-type", "Media type not accepted here")
             }

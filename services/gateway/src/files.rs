@@ -41,11 +41,19 @@ pub(crate) struct File {
 }
 
 /// The words of [`FileRole`].
-pub(crate) fn role_schema() -> openapi::Object {
-    let words = FileRole::ALL.map(FileRole::as_str);
+fn role_schema() -> openapi::Object {
+    words_schema(FileRole::ALL)
+}
+
+/// Those of files of sessions.
+pub(crate) fn session_role_schema() -> openapi::Object {
+    words_schema(FileRole::of_sessions())
+}
+
+fn words_schema(roles: impl IntoIterator<Item = FileRole>) -> openapi::Object {
     openapi::ObjectBuilder::new()
         .schema_type(openapi::Type::String)
-        .enum_values(Some(words))
+        .enum_values(Some(roles.into_iter().map(FileRole::as_str)))
         .examples([FileRole::ControlPoints.as_str()])
         .build()
 }

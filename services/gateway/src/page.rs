@@ -16,7 +16,7 @@ const MAX_LIMIT: u32 = 200;
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct PageQuery {
-    /// most items to give, 1 to 200; 50 when left out
+    /// maximum number of items, 1 to 200; 50 when left out
     #[param(minimum = 1, maximum = 200)]
     limit: Option<u32>,
     /// `next` of the page before; the first page when left out

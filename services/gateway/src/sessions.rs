@@ -1,4 +1,4 @@
-//! Capture sessions in the database, found in the caller's project only: what another project has is not there.
+//! Capture sessions in the database, found in the caller's project only: other projects' items are not found.
 
 use chrono::{DateTime, Utc};
 use queue::RunId;

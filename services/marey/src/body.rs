@@ -15,7 +15,7 @@ use client::{
 use formats::archive::{self, Entry, Limits};
 use serde_json::{Value, json};
 
-use crate::{database::or_removed, pack, watch};
+use crate::{database::or_removed, pack, watch, words::counted};
 
 /// `marey body …`
 #[derive(Debug, clap::Subcommand)]
@@ -64,9 +64,9 @@ pub struct LearnArgs {
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Learn here, without a server, and write this file
-    #[arg(long, short, value_name = "FILE", conflicts_with = "watch")]
+    #[arg(long, short, visible_alias = "output", value_name = "FILE", conflicts_with = "watch")]
     out: Option<PathBuf>,
-    /// Most principal components to keep
+    /// Maximum number of principal components
     #[arg(long, default_value_t = ::body::MAX_COMPONENTS, value_parser = components)]
     components: usize,
     /// Length of one unit of the scans, in metres [default: 1; for NPY it is worked out]
@@ -102,7 +102,7 @@ pub struct SampleArgs {
     #[arg(conflicts_with_all = ["stature", "mass", "age", "sex"])]
     alpha: Vec<f64>,
     /// File to write: .glb (with skeleton and skin), .ply or .obj
-    #[arg(long, short, value_name = "FILE")]
+    #[arg(long, short, visible_alias = "output", value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
     server: ServerArgs,
@@ -247,8 +247,9 @@ fn learn_here(args: &LearnArgs, out: &Path) -> anyhow::Result<()> {
     for warning in &set.warnings {
         eprintln!("warning: {warning}");
     }
-    println!("learning from {} scans", set.num_scans());
-    let description = format!("{}, learned from {} scans", args.name, set.num_scans());
+    let scans = counted(set.num_scans(), "scan");
+    println!("learning from {scans}");
+    let description = format!("{}, learned from {scans}", args.name);
     let learned =
         set.learn(&LearnOptions { components: args.components, description, ..LearnOptions::default() })?;
     let bytes = learned.model.to_bytes();
@@ -280,7 +281,8 @@ fn learn_there(args: &LearnArgs) -> anyhow::Result<()> {
     if args.watch {
         watch::until_end(&client, &run.id)?;
         let model: Value = client.get(&format!("/v1/body-models/{id}"))?;
-        println!("ready: {} components, {} vertices", model["num_components"], model["num_vertices"]);
+        let components = counted(&model["num_components"], "component");
+        println!("ready: {components}, {} vertices", model["num_vertices"]);
     }
     Ok(())
 }
@@ -291,9 +293,9 @@ fn sample(args: &SampleArgs) -> anyhow::Result<()> {
     let alpha = if args.alpha.is_empty() { model.alpha_for(&wanted)? } else { args.alpha.clone() };
     if alpha.len() > model.num_components() || alpha.iter().any(|a| a.is_nan() || a.abs() > 6.0) {
         bail!(
-            "--alpha has {} numbers, expected at most {} within -6 to 6",
-            alpha.len(),
-            model.num_components()
+            "--alpha: each number must be -6 to 6, at most {} of them; found {}",
+            model.num_components(),
+            alpha.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
         );
     }
     let shape = model.shape(&alpha);

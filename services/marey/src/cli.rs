@@ -8,7 +8,7 @@ use crate::{
     status, up, upload,
 };
 
-/// Full-body human motion from little measurement: a few points, a few cameras, or both.
+/// Full-body human motion from few measurements: a few points, a few cameras, or both.
 ///
 /// You measured the paths of a few points of a moving person (wrists, ankles, hips, head), or filmed them with calibrated
 /// cameras. Marey finds the most probable motion of the whole body and writes it as BVH for Blender, Maya or Unity, and in other
@@ -167,7 +167,9 @@ mod tests {
             (&["run", "take 3", "--points", "root,,head"], "found \"\", expected a name"),
             (&["run", " "], "found \" \", expected a name"),
             (&["upload", " ", "points.csv"], "found \" \", expected a name"),
-            (&["live", "points.csv", "-d", "walks", "--use", ""], "found \"\", expected a name"),
+            (&["bench", "live", "--streams", "0"], "must be at least 1"),
+            (&["data", "cmu", "--subjects", "abc", "rec"], "found \"abc\", expected a number such as 16"),
+            (&["live", "points.csv", "-d", "walks", "--points", ""], "found \"\", expected a name"),
         ] {
             let parsed = Cli::try_parse_from(["marey"].iter().chain(words));
             let message = parsed.map(|_| ()).unwrap_err().to_string();

@@ -25,8 +25,8 @@ const TRIES: u32 = 4;
 
 /// Download ASF and AMC files of the CMU Graphics Lab Motion Capture Database
 ///
-/// Writes DIR/16/16.asf, DIR/16/16_01.amc, … Files that are already there are not downloaded again, and one that broke off is
-/// continued (it is called .part until it is whole): just start it again. The data are free for all uses, but may not be
+/// Writes DIR/16/16.asf, DIR/16/16_01.amc, … Files that are already there are not downloaded again, and an interrupted download
+/// is resumed (its file is called .part until it is whole): just start it again. The data are free for all uses, but may not be
 /// resold; see http://mocap.cs.cmu.edu.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -34,16 +34,21 @@ const TRIES: u32 = 4;
   marey data cmu --subjects 16 --trials 15,16,21 recordings/")]
 pub struct Args {
     /// Subjects, by number, separated by commas
-    #[arg(long, required = true, value_delimiter = ',')]
+    #[arg(long, required = true, value_delimiter = ',', value_parser = number)]
     subjects: Vec<u32>,
     /// Trials, by number, separated by commas [default: all]
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', value_parser = number)]
     trials: Vec<u32>,
     /// Folder to write to
     dir: PathBuf,
     /// Server with the same files in the same places
     #[arg(long, default_value = CMU)]
     base_url: String,
+}
+
+/// The number of a subject or trial.
+fn number(text: &str) -> Result<u32, String> {
+    text.trim().parse().map_err(|_| format!("found {text:?}, expected a number such as 16"))
 }
 
 /// Runs `marey data cmu`.
@@ -71,8 +76,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     println!(
         "{} of {} in {}",
-        counted(num_trials as u64, "trial"),
-        counted(args.subjects.len() as u64, "subject"),
+        counted(num_trials, "trial"),
+        counted(args.subjects.len(), "subject"),
         args.dir.display()
     );
     println!(
@@ -82,7 +87,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if refused.is_empty() {
         Ok(())
     } else {
-        bail!("{} could not be downloaded:\n{}", counted(refused.len() as u64, "file"), refused.join("\n"))
+        bail!("{} could not be downloaded:\n{}", counted(refused.len(), "file"), refused.join("\n"))
     }
 }
 
@@ -222,7 +227,7 @@ impl Subject<'_> {
         if have > 0 {
             request = request.header("Range", format!("bytes={have}-"));
         }
-        let response = request.call()?;
+        let response = request.call().context("can't connect to the server")?;
         match response.status() {
             StatusCode::NOT_FOUND => {
                 fs::remove_file(part)?;

@@ -84,7 +84,7 @@ pub fn description(details: &Details) -> String {
         }
     };
     line("id", details.database.id.clone());
-    line("made", details.created_at.clone());
+    line("created", details.created_at.clone());
     line("ready", details.ready_at.clone().unwrap_or_default());
     let built = |run: &String| match details.build_seconds {
         Some(seconds) => format!("run {run}, {seconds:.1} s"),

@@ -38,9 +38,9 @@ const NUM_SAMPLES: u32 = 160;
 /// Show what Marey does, on motion of its own or on yours
 ///
 /// Starts everything, learns from recordings, and reconstructs others from 4 and from 6 of their points; then follows a
-/// synthetic person through the silhouettes of six cameras. Ends with how far the results are from the truth, beside a plain
-/// baseline, and where to look. Without --data, all motion is synthetic. Takes about a minute; no existing file is
-/// overwritten.
+/// synthetic person through the silhouettes of six cameras. At the end it reports how far the results are from the truth,
+/// beside a plain baseline, and what to look at. Without --data, all motion is synthetic. Takes about a minute; no existing
+/// file is overwritten.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey demo
@@ -50,7 +50,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// New folder for the results [default: marey-demo, or marey-demo-2 and so on if that exists]
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, visible_alias = "output", value_name = "DIR")]
     out: Option<PathBuf>,
     /// Leave the server running at the end, until Ctrl-C
     #[arg(long)]
@@ -105,7 +105,7 @@ fn show(client: &Client, given: Option<HeldOut>, folder: &Path, output: &Path) -
         Some(given) => given,
         None => HeldOut::in_folder(&draw_trials(&folder.join("recordings"))?)?,
     };
-    println!("Learning from {}; {} are held out", counted(learned.len() as u64, "trial"), tested.len());
+    println!("Learning from {}; {} are held out", counted(learned.len(), "trial"), tested.len());
     let database = build(client, &learned)?;
     let trials = trials::reconstruct(client, &database, &tested, output)?;
     let followed = cameras::show(client, folder, output)?;

@@ -36,8 +36,11 @@ fn http(url: &str) -> anyhow::Result<()> {
     let has_path = url.split_once("://").is_some_and(|(_, rest)| rest.trim_end_matches('/').contains('/'));
     let url = if has_path { url.to_owned() } else { format!("{}/readyz", url.trim_end_matches('/')) };
     let agent = ureq::Agent::config_builder().timeout_global(Some(TIMEOUT)).build().new_agent();
-    agent.get(&url).call().with_context(|| url.clone())?;
-    Ok(())
+    match agent.get(&url).call() {
+        Ok(_) => Ok(()),
+        Err(ureq::Error::StatusCode(status)) => bail!("{url} answers {status}"),
+        Err(error) => Err(error).with_context(|| format!("can't connect to {url}")),
+    }
 }
 
 async fn grpc(address: &str) -> anyhow::Result<()> {
@@ -49,7 +52,7 @@ async fn grpc(address: &str) -> anyhow::Result<()> {
     let status = tokio::time::timeout(TIMEOUT, check)
         .await
         .with_context(|| format!("{address} does not answer"))?
-        .with_context(|| format!("{address} can't be asked"))?;
+        .with_context(|| format!("can't connect to {address}"))?;
     if status != ServingStatus::Serving {
         bail!("{address} says {}", status.as_str_name());
     }

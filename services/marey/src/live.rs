@@ -57,12 +57,12 @@ pub struct Args {
     #[arg(long)]
     skeleton: Option<PathBuf>,
     /// Control points to use, separated by commas [default: all in the file]
-    #[arg(long = "use", value_delimiter = ',', value_parser = name, value_name = "POINTS")]
+    #[arg(long = "points", visible_alias = "use", value_delimiter = ',', value_parser = name, value_name = "NAMES")]
     chosen: Vec<String>,
-    /// File for the poses, as CSV: frame, then a column for each degree of freedom, metres and radians; what was in it is
-    /// replaced [default: the terminal]
-    #[arg(long, short)]
-    output: Option<PathBuf>,
+    /// File for the poses, as CSV: frame, then a column for each degree of freedom, metres and radians; overwritten if it exists
+    /// [default: the terminal]
+    #[arg(long, short, visible_alias = "output", value_name = "FILE")]
+    out: Option<PathBuf>,
     /// Compute every frame, however late, instead of dropping those that can't be computed in time
     #[arg(long)]
     every: bool,
@@ -90,7 +90,7 @@ fn check_outputs(args: &Args) -> anyhow::Result<()> {
     let points = Some(&args.points).filter(|path| path.as_path() != Path::new("-"));
     outputs::check(
         &[("the file of points", points), ("--skeleton", args.skeleton.as_ref())],
-        &[("--output", args.output.as_ref()), ("--state-file", args.state_file.as_ref())],
+        &[("--out", args.out.as_ref()), ("--state-file", args.state_file.as_ref())],
     )
 }
 
@@ -209,7 +209,7 @@ struct Answers<'a> {
 
 impl<'a> Answers<'a> {
     fn new(args: &'a Args, started: &Value, begin: Instant) -> anyhow::Result<Self> {
-        let output: Box<dyn Write> = match &args.output {
+        let output: Box<dyn Write> = match &args.out {
             Some(path) => Box::new(fs::File::create(path).with_context(|| path.display().to_string())?),
             None => Box::new(std::io::stdout()),
         };
@@ -367,10 +367,10 @@ mod tests {
         };
         assert_eq!(check("poses.csv", "p.state"), Ok(()));
         for (output, state, expected) in [
-            ("p.csv", "p.state", "the file of points and --output are both"),
-            ("sk.asf", "p.state", "--skeleton and --output are both"),
+            ("p.csv", "p.state", "the file of points and --out are both"),
+            ("sk.asf", "p.state", "--skeleton and --out are both"),
             ("poses.csv", "sk.asf", "--skeleton and --state-file are both"),
-            ("new", "new", "--output and --state-file are both"),
+            ("new", "new", "--out and --state-file are both"),
         ] {
             let message = check(output, state).unwrap_err();
             assert!(message.starts_with(expected), "{message}");

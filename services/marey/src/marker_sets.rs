@@ -19,9 +19,9 @@ const SHOWN: usize = 3;
 
 /// Show which markers a file has and which control points they make
 ///
-/// Compares the names in a C3D, TRC or CSV file with the known marker sets. `marey run` takes the best one by
+/// Compares the names in a C3D, TRC or CSV file with the known marker sets. `marey run` picks the best one by
 /// itself if there is no doubt, and needs none for control points under their standard names, such as
-/// left_wrist. --write makes a marker map of it, a text file to edit and to give to `marey run --map`.
+/// left_wrist. --write makes a marker map from it, a text file to edit and to give to `marey run --map`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey markers take3.c3d
@@ -70,8 +70,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     println!(
         "{}: {}, {} at {} Hz ({seconds:.1} s)",
         path.display(),
-        counted(file.num_points() as u64, "marker"),
-        counted(file.num_frames() as u64, "frame"),
+        counted(file.num_points(), "marker"),
+        counted(file.num_frames(), "frame"),
         file.frame_rate()
     );
     let is_measured = is_measured(&file);
@@ -109,12 +109,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     println!("\nknown marker sets that have some of the names:");
     for fit in found.iter().take(SHOWN) {
         println!(
-            "  {:<28} {} of {} control points; {} of the file's {} names",
+            "  {:<28} {} of {} control points; {} of {} in the file",
             fit.label(),
             fit.num_whole(),
             fit.points.len(),
             fit.num_known,
-            fit.num_names
+            counted(fit.num_names, "name")
         );
     }
     if found.is_empty() {

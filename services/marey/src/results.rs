@@ -14,17 +14,17 @@ use crate::watch;
 ///
 /// For Blender: File > Import > Motion Capture (.bvh), then motion.bvh. Of a session with cameras, look at
 /// overlay_CAMERA.mp4 first; body.glb opens in Blender by File > Import > glTF 2.0. If the run failed or was cancelled, this
-/// says so and fails too, after what there is.
+/// reports it and exits with an error, after listing what exists.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey results \"take 3\"                # lists them
   marey results \"take 3\" -o take3/      # downloads them")]
 pub struct Args {
-    /// The run: its id, or the name of a session, whose newest run is meant
+    /// The run: its id, or a session's name for its newest run
     run: String,
     /// Folder to download into [default: nothing is downloaded, the results are listed]
-    #[arg(long, short)]
-    output: Option<PathBuf>,
+    #[arg(long, short, visible_alias = "output", value_name = "DIR")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -35,13 +35,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let id = client.find_run(&args.run)?;
     // asked first: if it ends meanwhile, its results are there
     let run: Run = client.get(&format!("/v1/runs/{}", encode(&id)))?;
-    let results = match &args.output {
+    let results = match &args.out {
         Some(folder) => download(&client, &id, folder)?,
         None => list(&client, &id)?,
     };
     for result in &results {
-        let shown =
-            args.output.as_ref().map_or(result.name.clone().into(), |folder| folder.join(&result.name));
+        let shown = args.out.as_ref().map_or(result.name.clone().into(), |folder| folder.join(&result.name));
         println!("{:>12} bytes  {}", result.bytes, shown.display());
     }
     watch::not_in_vain(&run.state, run.error.as_deref())?;

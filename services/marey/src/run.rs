@@ -14,7 +14,7 @@ use crate::{marker_sets, watch, words::name};
 
 /// Reconstruct a session: a motion from control points, or a body and its motion from what cameras saw
 ///
-/// What the session's files are decides how: with control points, --database names the recordings to learn from; with a
+/// How depends on the session's files: with control points, --database names the recordings to learn from; with a
 /// calibration and videos, pictures or masks, the person's body is found and followed. Points and cameras together, or points
 /// without recordings: --kind inverse-kinematics.
 #[derive(Debug, clap::Args)]
@@ -34,7 +34,7 @@ pub struct Args {
     /// The session, by name or id
     #[arg(value_parser = name)]
     session: String,
-    /// sparse (control points and a motion database), multi-view (cameras) or inverse-kinematics [default: told by the
+    /// sparse (control points and a motion database), multi-view (cameras) or inverse-kinematics [default: by the
     /// session's files; required if it has both control points and cameras]
     #[arg(long, value_parser = PossibleValuesParser::new(gateway::session_run_kinds()))]
     kind: Option<String>,
@@ -93,15 +93,15 @@ struct SparseArgs {
     #[arg(long, value_name = "NUMBER")]
     neighbours: Option<u32>,
     /// Length of one unit of BVH files, in metres [default: 0.01, centimetres]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    bvh_unit: Option<f64>,
+    #[arg(long, visible_alias = "bvh-unit", value_name = "METRES", value_parser = positive)]
+    bvh_metres_per_unit: Option<f64>,
 }
 
 /// Options of a session with cameras.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Cameras")]
 struct CameraArgs {
-    /// Cameras to use, separated by commas [default: all that saw something]
+    /// Cameras to use, separated by commas [default: all that have pictures]
     #[arg(long, value_delimiter = ',', value_parser = name, value_name = "NAMES")]
     cameras: Vec<String>,
     /// Which camera a file is from, if its name doesn't tell; may be given several times
@@ -110,7 +110,7 @@ struct CameraArgs {
     /// Body model: NAME (its latest version) or NAME@VERSION [default: shipped]
     #[arg(long, value_name = "NAME")]
     body_model: Option<String>,
-    /// How the person is told from the background: auto, plate, adaptive or mixture [default: auto, which takes the plate if
+    /// How the person is separated from the background: auto, plate, adaptive or mixture [default: auto, which takes the plate if
     /// there is one]
     #[arg(long)]
     background: Option<String>,
@@ -184,7 +184,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What was sloppy about the files, as the run's report has it.
+/// Problems in the files, as the run's report has them.
 fn warnings(client: &Client, run: &str) -> anyhow::Result<Vec<String>> {
     let report: Value = client.get(&format!("/v1/runs/{run}/results/run.json"))?;
     let warnings = report["warnings"].as_array().into_iter().flatten();
@@ -212,7 +212,7 @@ fn request(args: &Args) -> anyhow::Result<Value> {
         ("points", (!args.points.points.is_empty()).then(|| json!(args.points.points))),
         ("marker_prefix", args.points.prefix.as_ref().map(|prefix| json!(prefix))),
         ("up", args.points.up.as_ref().map(|axis| json!(axis))),
-        ("bvh_metres_per_unit", args.sparse.bvh_unit.map(Value::from)),
+        ("bvh_metres_per_unit", args.sparse.bvh_metres_per_unit.map(Value::from)),
         ("method", args.sparse.method.as_ref().map(|m| json!(m))),
         ("window", args.sparse.window.map(Value::from)),
         ("neighbours", args.sparse.neighbours.map(Value::from)),

@@ -19,8 +19,8 @@ const NUM_SUBJECTS: u32 = 4;
 ///
 /// Draws trials from a small statistical model of human motion and writes them as ASF and AMC. They are synthetic: good for
 /// trying things, not for measuring how well real motion is reconstructed. Performers keep their names, so trials of several
-/// seeds may go into one folder: seed 1 draws synthetic1 to synthetic4, seed 2 synthetic2 to synthetic5, and so on. Files that
-/// are there with something else in them are not replaced.
+/// seeds may go into one folder: seed 1 draws synthetic1 to synthetic4, seed 2 synthetic2 to synthetic5, and so on. Existing
+/// files with other content are kept.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey sample --out recordings/ --count 40                # to learn from
@@ -28,7 +28,7 @@ const NUM_SUBJECTS: u32 = 4;
   marey sample --out walks/ --count 20 --action walk")]
 pub struct Args {
     /// Folder to write to
-    #[arg(long)]
+    #[arg(long, short, visible_alias = "output", value_name = "DIR")]
     out: PathBuf,
     /// How many trials
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let frames = args.frames as usize;
     let trials = Trials { count: args.count, seed: args.seed, action: args.action, frames, points };
     trials.write(&args.out)?;
-    println!("wrote {} to {}: {NOTICE}", counted(args.count.into(), "trial"), args.out.display());
+    println!("wrote {} to {}: {NOTICE}", counted(args.count, "trial"), args.out.display());
     Ok(())
 }
 

@@ -41,7 +41,7 @@ const STATURES_M: [f64; 5] = [1.58, 1.66, 1.73, 1.79, 1.86];
   marey run \"synthetic walk\" --set frame_rate=30 --watch   # silhouettes have no rate")]
 pub struct Args {
     /// New folder to write to, or an empty one
-    #[arg(long)]
+    #[arg(long, short, visible_alias = "output", value_name = "DIR")]
     out: PathBuf,
     /// Number of cameras, in a circle around the person
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(2..=32))]
@@ -71,8 +71,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     bar.finish_and_clear();
     println!(
         "wrote {} of {} to {}: synthetic, with the truth in groundtruth/",
-        counted(args.frames.into(), "frame"),
-        counted(args.cameras.into(), "camera"),
+        counted(args.frames, "frame"),
+        counted(args.cameras, "camera"),
         args.out.display()
     );
     Ok(())

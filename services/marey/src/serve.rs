@@ -5,33 +5,54 @@ use service::config::{TelemetryConfig, Variables, environment};
 
 use crate::CODE;
 
+/// What every service with a worker is told.
+const VARIABLES: &str = "\
+Must be set:
+  MAREY_DATABASE_URL          PostgreSQL, postgres://user@host/name
+  MAREY_STORE                 folder or URL for objects
+May be set:
+  MAREY_LISTEN                address to listen on
+  MAREY_WORKER_CONCURRENCY    jobs at once [default: number of cores]; 0 answers calls only
+  MAREY_WORKER_NAME           name in the queue and in run.json
+  MAREY_DATABASE_CONNECTIONS  most connections to PostgreSQL, beside three of the worker [default: 8]
+  MAREY_SHUTDOWN_GRACE_SECS   time for calls and jobs after a signal [default: 20]
+  MAREY_DATABASE_CACHE_BYTES  what was learned and is kept in memory [default: 2 GiB]
+  MAREY_MAX_OBJECT_BYTES      largest object read into memory [default: 1 GiB]
+  MAREY_MAX_INPUT_BYTES       unpacked files of one build [default: 8 GiB]
+  MAREY_MAX_BUILD_BYTES       what one job of a build keeps in memory [default: 2 GiB]
+  MAREY_MAX_SESSION_FRAMES    frames of one session at 60 a second [default: 432000]
+  MAREY_LOG                   filter, such as warn,motion_index=debug [default: info]
+  MAREY_LOG_FORMAT            pretty or json [default: pretty]";
+
 /// `marey serve …`
 #[derive(Debug, clap::Subcommand)]
 pub enum Service {
     /// The HTTP interface
     ///
     /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:8080), MAREY_MAX_UPLOAD_BYTES (536870912),
-    /// MAREY_BOOTSTRAP_KEY and MAREY_RECONSTRUCTION (http://127.0.0.1:50052, where live streams go) may be set.
+    /// MAREY_BOOTSTRAP_KEY, MAREY_RECONSTRUCTION (http://127.0.0.1:50052, where live streams go), MAREY_LOG and MAREY_LOG_FORMAT
+    /// may be set.
     Gateway,
     /// Builds motion databases and answers queries on them
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:50051), MAREY_WORKER_CONCURRENCY and others
-    /// may be set.
+    /// Listens on 127.0.0.1:50051. Several replicas are given MAREY_MOTION_INDEX_PEERS (the addresses of all) and
+    /// MAREY_MOTION_INDEX_SELF (which of them this one is).
+    #[command(after_help = VARIABLES)]
     MotionIndex,
     /// Reconstructs motion
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:50052), MAREY_WORKER_CONCURRENCY and others
-    /// may be set.
+    /// Listens on 127.0.0.1:50052. MAREY_LIVE_STREAMS (8 a core) and MAREY_LIVE_IDLE_SECS (60) bound live streams.
+    #[command(after_help = VARIABLES)]
     Reconstruction,
     /// Learns body models, makes silhouettes, finds pose and shape in them, draws what was found over videos
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:50053), MAREY_WORKER_CONCURRENCY and others
-    /// may be set. Videos need the program ffmpeg and room for a copy in TMPDIR.
+    /// Listens on 127.0.0.1:50053. Videos need the program ffmpeg and room for a copy in TMPDIR.
+    #[command(after_help = VARIABLES)]
     ShapeInit,
     /// Follows people through the frames of sessions with cameras
     ///
-    /// MAREY_DATABASE_URL and MAREY_STORE must be set. MAREY_LISTEN (127.0.0.1:50054), MAREY_WORKER_CONCURRENCY and others
-    /// may be set.
+    /// Listens on 127.0.0.1:50054.
+    #[command(after_help = VARIABLES)]
     Refinement,
 }
 

@@ -5,14 +5,14 @@ use serde_json::json;
 
 use crate::watch;
 
-/// Show how far runs are
+/// Show the progress of runs
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey status                        # the latest runs
   marey status \"take 3\"               # the newest run of a session
   marey status \"take 3\" --watch")]
 pub struct Args {
-    /// The run: its id, or the name of a session, whose newest run is meant [default: the latest runs are listed]
+    /// The run: its id, or a session's name for its newest run [default: the latest runs are listed]
     run: Option<String>,
     /// Show the progress and wait for the end
     #[arg(long, short, requires = "run")]
@@ -26,7 +26,7 @@ pub struct Args {
 #[command(after_help = "Examples:
   marey cancel \"take 3\"")]
 pub struct CancelArgs {
-    /// The run: its id, or the name of a session, whose newest run is meant
+    /// The run: its id, or a session's name for its newest run
     run: String,
     #[command(flatten)]
     server: ServerArgs,
@@ -48,10 +48,23 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 /// Runs `marey cancel`.
 pub fn cancel(args: &CancelArgs) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
-    let path = format!("/v1/runs/{}/cancel", client.find_run(&args.run)?);
-    let run: Run = client.post(&path, &json!({}))?;
-    println!("run {} is {}", run.id, run.state);
+    let path = format!("/v1/runs/{}", client.find_run(&args.run)?);
+    let before: Run = client.get(&path)?;
+    let run: Run = client.post(&format!("{path}/cancel"), &json!({}))?;
+    println!("{}", cancelled(&run, &before.state));
     Ok(())
+}
+
+/// What became of a run that was to be cancelled; `before`: its state until then.
+fn cancelled(run: &Run, before: &str) -> String {
+    let Run { id, state, .. } = run;
+    match (before, state.as_str()) {
+        ("failed" | "succeeded", ended) => format!("run {id} had already {ended}; nothing to cancel"),
+        ("cancelled", _) => format!("run {id} was already cancelled; nothing to cancel"),
+        (_, "cancelled") => format!("run {id} is cancelled"),
+        (_, ended @ ("failed" | "succeeded")) => format!("run {id} {ended} before it could be cancelled"),
+        _ => format!("run {id} is being cancelled"),
+    }
 }
 
 fn list(client: &Client) -> anyhow::Result<()> {
@@ -90,8 +103,8 @@ fn state(run: &Run) -> String {
 
 fn show(run: &Run) {
     println!("run      {}", run.id);
-    println!("what     {}: {}", run.kind, subject(run));
-    println!("asked    {}", run.created_at);
+    println!("run of   {}: {}", run.kind, subject(run));
+    println!("started  {}", run.created_at);
     println!("state    {}", state(run));
     if let Some(error) = &run.error {
         println!("error    {error}");

@@ -26,8 +26,8 @@ const GRACE: Duration = Duration::from_secs(5);
 /// Start everything on this machine
 ///
 /// PostgreSQL, the HTTP interface and the services that do the work, in one process. Everything is kept in the data folder:
-/// when you start it again, all of it is still there. Ctrl-C stops it. Only this machine can reach it, unless --listen says
-/// otherwise.
+/// when you start it again, all of it is still there. Ctrl-C stops it. Only this machine can reach it, unless you change
+/// --listen.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Examples:
   marey up

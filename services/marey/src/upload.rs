@@ -8,7 +8,7 @@ use formats::FileRole;
 use serde_json::Value;
 
 use crate::{
-    session_files,
+    session_files::{self, SessionFile},
     words::{counted, name},
 };
 
@@ -25,7 +25,7 @@ use crate::{
   marey upload \"take 3\" points.csv skeleton.asf
   marey upload \"take 3\" truth.amc                       # the true motion, where it is known
   marey upload \"on a rig\" points.csv
-  marey upload \"on a rig\" rig.bvh --role skeleton       # otherwise taken for the true motion
+  marey upload \"on a rig\" rig.bvh --role skeleton       # a .bvh counts as the true motion otherwise
   marey upload \"markers\" take3.c3d skeleton.asf
   marey upload \"take 4\" calib.toml cam*.mp4 plates/     # a session with cameras")]
 pub struct Args {
@@ -35,7 +35,7 @@ pub struct Args {
     /// Files to upload, or folders of pictures
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// What the files are: skeleton, control-points, ground-truth, calibration, video, images, masks or plate [default: told by
+    /// What the files are: skeleton, control-points, ground-truth, calibration, video, images, masks or plate [default: by
     /// their names]
     #[arg(long)]
     role: Option<FileRole>,
@@ -55,14 +55,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         "--name is for a single file, found {} to upload",
         files.len()
     );
+    let files = with_roles(files, args)?;
     let client = Client::new(args.server.server()?);
     let (session, is_new) = match client.find_session(&args.session)? {
         Some(session) => (session, false),
         None => (client.create_session(&args.session)?, true),
     };
-    for (index, found) in files.into_iter().enumerate() {
-        let name = args.name.clone().unwrap_or(found.name);
-        let sent = put(&client, &session, &name, args.role.or(found.role), found.file);
+    for (index, (name, role, file)) in files.into_iter().enumerate() {
+        let sent = put(&client, &session, &name, role, file);
         if sent.is_err() && is_new && index == 0 {
             // refused before it held anything: as if it had not been made
             client.delete(&format!("/v1/sessions/{}", session.id))?;
@@ -73,6 +73,17 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Every file with its name there and the role that is stated for it; refuses what the server would, before anything is sent.
+fn with_roles(files: Vec<SessionFile>, args: &Args) -> anyhow::Result<Vec<(String, Option<FileRole>, File)>> {
+    let named = files.into_iter().map(|found| {
+        let name = args.name.clone().unwrap_or(found.name);
+        let role = args.role.or(found.role);
+        FileRole::in_session(&name, role)?;
+        Ok((name, role, found.file))
+    });
+    named.collect()
 }
 
 /// Uploads one file and says so.
@@ -103,4 +114,45 @@ pub fn send(
     let query = role.map(|role| format!("?role={}", encode(role.as_str()))).unwrap_or_default();
     let path = format!("/v1/sessions/{}/files/{}{query}", session.id, encode(name));
     client.put_file(&path, file).with_context(|| name.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Alone {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    #[test]
+    fn every_file_is_looked_at_before_the_first_is_sent() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        for name in ["points.csv", "up.log", "index.csv"] {
+            fs::write(folder.path().join(name), "x").unwrap();
+        }
+        let check = |words: &[&str]| {
+            let args = Alone::parse_from(["upload", "s"].iter().chain(words)).args;
+            // no server is there: what is refused is refused before one is asked
+            with_roles(session_files::gather(&args.files)?, &args).map(|files| files.len())
+        };
+        let points = path("points.csv");
+        assert_eq!(check(&[&points]).unwrap(), 1);
+        let (log, index) = (path("up.log"), path("index.csv"));
+        for (words, expected) in [
+            (&[points.as_str(), &log][..], "the type of \"up.log\" is not known"),
+            (&[&points, &index], "\"index.csv\" is the list that goes with files for motion databases"),
+            (&[&points, "--role", "motion"], "role motion belongs to motion databases"),
+            (&[&points, "--role", "skeleton"], "a skeleton must be .asf or .bvh, found \"points.csv\""),
+        ] {
+            let message = check(words).unwrap_err().to_string();
+            assert!(message.starts_with(expected), "{message}");
+        }
+    }
 }

@@ -57,7 +57,7 @@ pub fn until_end_with(client: &Client, run_id: &str, show: impl FnMut(&Progress)
 /// If it has failed or was cancelled.
 pub fn not_in_vain(state: &str, error: Option<&str>) -> anyhow::Result<()> {
     match state {
-        "failed" => bail!("the run failed: {}", error.unwrap_or("nobody said why")),
+        "failed" => bail!("the run failed: {}", error.unwrap_or("no reason given")),
         "cancelled" => bail!("the run was cancelled"),
         _ => Ok(()),
     }
@@ -153,7 +153,7 @@ mod tests {
             error("failed", Some("points.csv has no frame")),
             "the run failed: points.csv has no frame"
         );
-        assert_eq!(error("failed", None), "the run failed: nobody said why");
+        assert_eq!(error("failed", None), "the run failed: no reason given");
         assert_eq!(error("cancelled", None), "the run was cancelled");
         for state in ["queued", "running", "succeeded"] {
             assert!(not_in_vain(state, None).is_ok(), "{state}");

@@ -1,12 +1,6 @@
-//! Words that depend on numbers, and names.
+//! Names on the command line, and words that depend on numbers.
 
-/// A number with its noun: `1 trial`, `2 trials`.
-pub fn counted(count: u64, noun: &str) -> String {
-    match count {
-        1 => format!("1 {noun}"),
-        _ => format!("{count} {noun}s"),
-    }
-}
+pub use model::counted;
 
 /// A name on the command line.
 ///
@@ -21,7 +15,7 @@ pub fn name(text: &str) -> Result<String, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{counted, name};
+    use super::name;
 
     #[test]
     fn blanks_are_no_name() {
@@ -29,10 +23,5 @@ mod tests {
         for blank in ["", " ", "\t "] {
             assert_eq!(name(blank), Err(format!("found {blank:?}, expected a name")));
         }
-    }
-
-    #[test]
-    fn one_is_singular() {
-        assert_eq!([0, 1, 2].map(|n| counted(n, "trial")), ["0 trials", "1 trial", "2 trials"]);
     }
 }

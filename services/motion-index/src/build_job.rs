@@ -14,6 +14,7 @@ use library::{
     AllCores,
     motion_database::{INDEX, SHARDS, Shard, ShardList, ShardedClip},
 };
+use model::counted;
 use motion_db::MotionDatabase;
 use queue::{Handler, JobContext, JobError, Outcome};
 use results::{ResultFile, media_type::JSON};
@@ -173,7 +174,7 @@ impl BuildHandler {
             context.check()?;
             let source = listed[0].source;
             let done = (shard as f64 + 0.8 * source as f64 / sources.files.len() as f64) / num_shards as f64;
-            context.progress(done, format!("putting {} clips together", sources.clips.len()));
+            context.progress(done, format!("putting {} together", counted(sources.clips.len(), "clip")));
             let part = sources.open(source, &self.resources, request).await?;
             let mut database = match gathered.take() {
                 Some(database) => database,

@@ -7,6 +7,7 @@ use jobs::{
     motion_database::{BuildMotionDatabase, ImportMotion, MotionDatabaseFile, PlanMotionDatabase},
 };
 use library::{motion_database, motion_database::Index};
+use model::counted;
 use motion_db::MotionDatabase;
 use queue::{Artefact, ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{Resources, compute, objects};
@@ -113,8 +114,9 @@ impl PlanHandler {
         self.close_part(context, &mut divided).await?;
         if divided.motions.is_empty() && request.base.is_none() {
             let message = format!(
-                "found {num_entries} files, no motion among them; expected at least one AMC file with its ASF file, or a \
-                 BVH file"
+                "found {}, no motion among them; expected at least one AMC file with its ASF file, or a \
+                 BVH file",
+                counted(num_entries, "file")
             );
             return Err(JobError::give_up(message, ""));
         }

@@ -108,7 +108,8 @@ impl Sources {
         let names = names(&report.clips, &mut self.names);
         for (index, (clip, name)) in report.clips.into_iter().zip(names).enumerate() {
             if name != clip.name && trial_name(&clip.name) == clip.name {
-                self.warnings.push(format!("another motion named {} is called {name}", clip.name));
+                let own = &clip.name;
+                self.warnings.push(format!("two motions are named {own}; the second was renamed {name}"));
             }
             let clip = Clip { name, subject: clip.subject, action: clip.action, num_poses: clip.num_poses };
             self.clips.push(Listed { source: self.files.len(), index, clip });

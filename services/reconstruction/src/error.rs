@@ -14,7 +14,7 @@ pub enum InputError {
     #[error(transparent)]
     File(#[from] FileError),
     /// A file is of a kind that its role does not take.
-    #[error("{file}: found a file of another kind, expected {} for role {role}", .role.endings())]
+    #[error("{file}: not a {} file", .role.endings())]
     Kind {
         /// Name of the file.
         file: String,
@@ -52,7 +52,7 @@ pub enum InputError {
     },
     /// The session is longer than this service takes.
     #[error(
-        "session has {frames} frames at 60 frames a second, expected at most {limit}; cut it and upload the parts"
+        "the session has {frames} frames at 60 frames a second, expected at most {limit}; cut it and upload the parts"
     )]
     TooLong {
         /// Number of frames.

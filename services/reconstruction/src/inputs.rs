@@ -86,9 +86,7 @@ pub(crate) fn read(
     {
         warnings.extend(truth.warnings.iter().map(|w| w.to_string()));
         if !truth.value.skeleton().same_structure(&session.skeleton) {
-            warnings.push(
-                "the ground truth has another skeleton than the session: it is not compared".to_owned(),
-            );
+            warnings.push("the ground truth uses a different skeleton, so it was not compared".to_owned());
         }
     }
     Ok(Evidence { session, warnings, has_skeleton: own.is_some() })
@@ -142,8 +140,7 @@ pub(crate) fn measured_points(
     let file = at_most_one(files, FileRole::ControlPoints)?.ok_or_else(|| FileError::Count {
         role: FileRole::ControlPoints,
         found: 0,
-        names: String::new(),
-        expected: format!("one ({})", FileRole::ControlPoints.endings()),
+        names: format!(" ({})", FileRole::ControlPoints.endings()),
     })?;
     Ok((file.name.clone(), read_points(file, reading, warnings)?))
 }
@@ -168,7 +165,7 @@ fn at_most_one(files: &[NamedBytes], role: FileRole) -> Result<Option<&NamedByte
     if found.len() > 1 {
         let names = found.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
         let names = format!(" ({names})");
-        return Err(FileError::Count { role, found: found.len(), names, expected: "one".to_owned() }.into());
+        return Err(FileError::Count { role, found: found.len(), names }.into());
     }
     Ok(found.first().copied())
 }

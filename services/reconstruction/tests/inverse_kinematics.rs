@@ -179,7 +179,7 @@ async fn what_can_not_be_solved_is_refused_with_what_was_found() {
         (
             frames(&|f| f[0].targets[0].name = "tail".into()),
             Code::InvalidArgument,
-            "tail is not on the skeleton",
+            "the skeleton has no \"tail\"",
         ),
         (frames(&|f| f.iter_mut().for_each(|f| f.targets.clear())), Code::InvalidArgument, "control points"),
         (

@@ -241,14 +241,14 @@ async fn bad_input_fails_the_run_with_a_message_that_names_the_place() {
     };
     let cut_asf = fixture.upload("cut.asf", FileRole::Skeleton, &walker::ASF.as_bytes()[..900]).await;
     let cases = [
-        (vec![asf.clone()], vec![], "session has 0 files of role control-points"),
-        (vec![good.clone(), good.clone()], vec![], "session has 2 files of role control-points"),
+        (vec![asf.clone()], vec![], "the session has no file of control points"),
+        (vec![good.clone(), good.clone()], vec![], "the session has 2 files of control points"),
         (vec![torn], vec![], "torn.csv: line"),
-        (vec![other], vec![], "notes.txt: found a file of another kind"),
+        (vec![other], vec![], "notes.txt: not a .csv, .trc or .c3d file"),
         (vec![gone], vec![], "is not in the store any more"),
         (vec![cut_asf, good.clone()], vec![], "cut.asf: "),
         (vec![asf.clone(), good.clone()], vec!["left_wrist", "tail"], "tail"),
-        (vec![asf, good], vec!["left_wrist"], "found 1 control points"),
+        (vec![asf, good], vec!["left_wrist"], "only 1 control point; "),
     ];
     for (files, points, expected) in cases {
         let mut request = fixture.request(files);

@@ -98,7 +98,7 @@ fn doubts(finished: &Finished) -> Vec<String> {
     let unseen = numbers(frames, |tracked| tracked.stage == Stage::Unseen);
     if !unseen.is_empty() {
         doubts.push(format!(
-            "nobody was found in {} of {} frames ({}): there the pose before them is held, and joints.* have no positions. Is \
+            "nobody was found in {} of {} frames ({}): there the last pose is kept, and joints.* have no positions. Is \
              the person in view of at least two cameras there?",
             unseen.len(),
             frames.len(),

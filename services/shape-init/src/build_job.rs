@@ -9,6 +9,7 @@ use jobs::{
     body_model::{BuildBodyModel, VersionName},
     run_json::{RUN_JSON, RunReport, Timings},
 };
+use model::counted;
 use queue::{Handler, JobContext, JobError, Outcome};
 use results::{ResultFile, media_type::JSON};
 use serde::Serialize;
@@ -56,11 +57,11 @@ impl Handler for BuildHandler {
         let options = ScanOptions { metres_per_unit: request.metres_per_unit };
         let set = compute::run(move || ScanSet::read(entries, &options)).await.map_err(InputError::from)?;
         context.check()?;
-        context.progress(0.4, format!("learning from {} scans", set.num_scans()));
+        context.progress(0.4, format!("learning from {}", counted(set.num_scans(), "scan")));
         let learning = LearnOptions {
             components: request.components,
             description: format!(
-                "{}@{}, learned from {} scans",
+                "{}@{}, learned from {}",
                 request.body_model.name,
                 request.body_model.version,
                 set.num_scans()
@@ -148,7 +149,7 @@ fn contents(set: &ScanSet, learned: &Learned, files: &[InputFile]) -> Contents {
     if warnings.len() > 20 {
         let more = warnings.len() - 20;
         warnings.truncate(20);
-        warnings.push(format!("{more} more of the kind"));
+        warnings.push(format!("and {}", counted(more, "similar warning")));
     }
     Contents {
         description: model.description().to_owned(),

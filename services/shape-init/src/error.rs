@@ -2,6 +2,7 @@
 
 use camera_jobs::ShapeError;
 use library::body_model::ModelError;
+use model::counted;
 use proto::ErrorCode;
 use queue::JobError;
 use service::FileError;
@@ -13,6 +14,24 @@ pub enum InputError {
     /// A file can't be read, or something else is there than should be.
     #[error(transparent)]
     File(#[from] FileError),
+    /// A camera has no frames where they are wanted.
+    #[error("{file} has {}; first_frame is {first}", count.map_or("too few frames".to_owned(), |count| counted(count, "frame")))]
+    NoFirstFrame {
+        /// Name of the file.
+        file: String,
+        /// Its frames, where they are known.
+        count: Option<usize>,
+        /// First frame that is wanted.
+        first: usize,
+    },
+    /// A camera that the calibration lacks.
+    #[error("no camera {name:?}; the calibration has {known}")]
+    NoCamera {
+        /// Name that is wanted.
+        name: String,
+        /// Names that there are.
+        known: String,
+    },
     /// A video can't be read.
     #[error("{message}")]
     Video {

@@ -108,14 +108,9 @@ fn calibration_file(files: &[InputFile]) -> Result<&InputFile, InputError> {
         [only] => Ok(only),
         _ => {
             let names: Vec<&str> = found.iter().map(|file| file.name.as_str()).collect();
-            let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
-            Err(FileError::Count {
-                role: FileRole::Calibration,
-                found: found.len(),
-                names,
-                expected: "one".to_owned(),
-            }
-            .into())
+            let role = FileRole::Calibration;
+            let names = if names.is_empty() { role.endings() } else { names.join(", ") };
+            Err(FileError::Count { role, found: found.len(), names: format!(" ({names})") }.into())
         }
     }
 }

@@ -119,12 +119,7 @@ impl<'a, S: Sink> Packer<'a, S> {
     fn finish(mut self, name: &str) -> Result<usize, InputError> {
         if self.frame == self.parameters.first_frame {
             let first = self.parameters.first_frame;
-            let found = match self.count {
-                Some(count) => format!("{count} frames"),
-                None => format!("no frame {first}"),
-            };
-            let expected = format!("more than first_frame, {first}");
-            return Err(FileError::unexpected(name, found, expected).into());
+            return Err(InputError::NoFirstFrame { file: name.to_owned(), count: self.count, first });
         }
         self.close();
         Ok(self.frame)
@@ -241,7 +236,7 @@ fn early_end(
         return Ok(None);
     }
     let missing = announced.filter(|&count| end_frame + 1 < count);
-    Ok(missing.map(|count| format!("{name}: {end_frame} frames came, the file announces {count}")))
+    Ok(missing.map(|count| format!("{name}: only {end_frame} of {count} frames could be read")))
 }
 
 /// At most `most` frames, spread over the whole clip.

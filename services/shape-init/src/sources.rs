@@ -8,6 +8,7 @@ use jobs::{
     InputFile,
     multi_view::{Members, Source, SourceKind},
 };
+use model::counted;
 use multi_view::{assign, find_camera};
 use service::FileError;
 
@@ -98,7 +99,7 @@ pub(crate) fn match_cameras(
 ) -> Result<Vec<CameraSources>, InputError> {
     let asked = asked.iter().map(|name| {
         find_camera(name, cameras)
-            .ok_or_else(|| FileError::unexpected("cameras", format!("{name:?}"), cameras.join(", ")))
+            .ok_or_else(|| InputError::NoCamera { name: name.clone(), known: cameras.join(", ") })
     });
     let asked: Vec<usize> = asked.collect::<Result<_, _>>()?;
     let (plates, pictures): (Vec<Source>, Vec<Source>) =
@@ -160,6 +161,6 @@ pub(crate) fn check_count(found: &[CameraSources], least: usize) -> Result<(), I
     if found.len() >= least {
         return Ok(());
     }
-    let seen = format!("pictures of {} of the calibrated cameras", found.len());
+    let seen = format!("pictures of {}", counted(found.len(), "camera"));
     Err(FileError::unexpected("session", seen, format!("at least {least}")).into())
 }

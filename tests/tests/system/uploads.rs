@@ -174,10 +174,10 @@ fn a_file_that_no_session_has_is_refused_with_what_it_could_be() -> Result<()> {
     let api = system.project("p")?;
     let session = api.session("s", &[])?;
     for (file, expected) in [
-        ("notes.txt", "\"notes.txt\" ends like no file of a session, expected one of: "),
-        ("points", "\"points\" ends like no file of a session"),
-        ("walk.bvh?role=motion", "role motion is for files that motion databases are built from"),
-        ("scans.zip?role=scans", "role scans is for files that body models are built from"),
+        ("notes.txt", "the type of \"notes.txt\" is not known; sessions take: "),
+        ("points", "the type of \"points\" is not known"),
+        ("walk.bvh?role=motion", "role motion belongs to motion databases, not to sessions"),
+        ("scans.zip?role=scans", "role scans belongs to body models, not to sessions"),
     ] {
         let refused = api.put(&format!("{session}/files/{file}"), b"x")?;
         let detail = refused.json()["detail"].as_str().unwrap_or_default().to_owned();

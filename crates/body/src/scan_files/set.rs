@@ -1,6 +1,7 @@
 //! The files that a body model is learned from.
 
 use formats::archive::Entry;
+use model::counted;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -33,7 +34,7 @@ pub struct ScanSet {
     pub template: Template,
     scans: Vec<RawScan>,
     subjects: Vec<Subject>,
-    /// what was sloppy about the files, with their names
+    /// problems in the files, with their names
     pub warnings: Vec<String>,
 }
 
@@ -60,7 +61,7 @@ impl ScanSet {
                 });
             }
             (None, true) => {
-                let found = format!("{} files, no scan among them", entries.len());
+                let found = format!("{}, no scan among them", counted(entries.len(), "file"));
                 let expected = "one OBJ or PLY a scan, or vertices.npy with faces.npy".into();
                 return Err(Error::ScanSet { found, expected });
             }

@@ -15,6 +15,7 @@ use client::{
     outputs,
     parameters::values,
 };
+use model::counted;
 use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::json;
@@ -38,7 +39,7 @@ const START_WAIT: Duration = Duration::from_secs(60);
   marey bench live --database walks --test more/ --streams 2 --seconds 10")]
 pub struct Args {
     /// Performers at once
-    #[arg(long, default_value_t = 8)]
+    #[arg(long, default_value_t = 8, value_parser = at_least_one)]
     streams: usize,
     /// Frames a second of each
     #[arg(long, default_value_t = 60.0, value_parser = positive)]
@@ -64,11 +65,15 @@ pub struct Args {
     /// Send the frames of all streams at the same moment, instead of evenly spread
     #[arg(long)]
     aligned: bool,
-    /// Write the numbers to this file too; what was in it is replaced
+    /// Write the numbers to this file too; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
     server: ServerArgs,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|count| *count > 0).ok_or_else(|| "must be at least 1".to_owned())
 }
 
 /// What was measured.
@@ -121,8 +126,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         max_ms: latency.quantile_ms(1.0),
     };
     println!(
-        "{} streams at {} frames/s for {} s, {} points, {} poses in the database",
-        args.streams,
+        "{} at {} frames/s for {} s, {} points, {} poses in the database",
+        counted(args.streams, "stream"),
         args.fps,
         args.seconds,
         args.points,

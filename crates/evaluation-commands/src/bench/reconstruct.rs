@@ -32,7 +32,7 @@ const PARTS: [(&str, FramePart); 5] = [
 /// Measure how long one frame of a reconstruction takes on one thread, and each part of it
 ///
 /// Trials of the query folders are reconstructed from their own control points with a database of the training folders, from
-/// which the trial itself is left out. Frames on which a start was sought are counted apart from steady ones.
+/// which the trial itself is left out. Frames that needed a new start are counted separately from steady ones.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 query   measurements in the performer's frame, window features in principal axes
@@ -67,7 +67,7 @@ pub struct Args {
     /// At most this many trials, spread evenly over their names
     #[arg(long, default_value_t = 24)]
     trials: usize,
-    /// Write the numbers to this file; what was in it is replaced
+    /// Write the numbers to this file; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -278,7 +278,7 @@ fn measure(args: &Args, database: &MotionDatabase, trials: &[Clip], window: u8) 
         Parameters { window: usize::from(window), neighbours: args.neighbours, ..Parameters::default() };
     let index = WindowIndex::new(database, parameters.window)?;
     let Some(names) = ControlSet::names(usize::from(args.points)) else {
-        bail!("{} control points, expected 2 to 6", args.points);
+        bail!("--points is {}, expected 2 to 6", args.points);
     };
     let watch = Mutex::new(Watch::new());
     let locked = || watch.lock().unwrap_or_else(PoisonError::into_inner);

@@ -51,10 +51,10 @@ pub struct Args {
     /// Frames of each trial to search for, from its middle
     #[arg(long, default_value_t = 60)]
     frames: usize,
-    /// Keep the index file here; what was in it is replaced
+    /// Keep the index file here; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     index: Option<PathBuf>,
-    /// Write the numbers to this file; what was in it is replaced
+    /// Write the numbers to this file; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }

@@ -6,6 +6,7 @@ use evaluation::{
     ControlSet, FeetResult, FootNumbers, SkeletonResult, SkeletonSource, SkeletonTrial, at_database_rate,
     evaluate_feet, evaluate_skeletons,
 };
+use model::counted;
 use motion_db::{Clip, MotionDatabase, WindowIndex};
 use serde::Serialize;
 use skeleton_fit::FitSettings;
@@ -35,7 +36,7 @@ pub struct Args {
     /// Which of the trials: those the defaults were tuned on, the others, or all
     #[arg(long, value_enum, default_value_t = Part::All)]
     part: Part,
-    /// Write the numbers of every trial to this file; what was in it is replaced
+    /// Write the numbers of every trial to this file; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -78,7 +79,7 @@ pub fn skeletons(args: &Args) -> anyhow::Result<()> {
             print_skeleton_row(points, source, &in_case);
         }
     }
-    println!("{} trials, each from recordings of other performers", test.len());
+    println!("{}, each from recordings of other performers", counted(test.len(), "trial"));
     write(args, &results)
 }
 
@@ -171,7 +172,7 @@ pub fn feet(args: &Args) -> anyhow::Result<()> {
 
 fn names(points: usize) -> anyhow::Result<&'static [&'static str]> {
     ControlSet::names(points)
-        .with_context(|| format!("{points} control points were asked for, expected 2 to 6"))
+        .with_context(|| format!("{} asked for, expected 2 to 6", counted(points, "control point")))
 }
 
 fn write(args: &Args, results: &impl Serialize) -> anyhow::Result<()> {

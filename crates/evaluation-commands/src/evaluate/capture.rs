@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context, bail};
 use evaluation::Body;
 use formats::{calibration, image_files};
-use model::{Camera, Image, Mesh, Silhouette};
+use model::{Camera, Image, Mesh, Silhouette, counted};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
@@ -58,10 +58,10 @@ impl Folder {
         for frame in read.frames {
             if frame.joints.len() != read.joint_names.len() {
                 bail!(
-                    "{}: frame {} has {} joints, expected {}, the number of names",
+                    "{}: frame {} has {}, expected {}, the number of names",
                     file.display(),
                     frame.frame,
-                    frame.joints.len(),
+                    counted(frame.joints.len(), "joint"),
                     read.joint_names.len()
                 );
             }

@@ -7,7 +7,7 @@ use body::{BodyModel, Shape};
 use client::outputs;
 use evaluation::limbs::{LimbErrors, Limbs, Method, Still, run_all};
 use inverse_kinematics::Recording;
-use model::{Motion, Silhouette};
+use model::{Motion, Silhouette, counted};
 use motion_db::Clip;
 use sample_motion::{Action, DrawOptions, Model};
 use serde::Serialize;
@@ -36,13 +36,13 @@ pub struct Args {
     /// Motion files of people who walk
     #[arg(long, num_args = 1.., value_name = "FILE")]
     walking: Vec<PathBuf>,
-    /// Folder of motion with an index.csv: its trials whose action is boxing or walk, but for those that were tuned on
+    /// Folder of motion with an index.csv: its trials whose action is boxing or walk, except those that were tuned on
     #[arg(long, value_name = "DIR", conflicts_with_all = ["boxing", "walking"])]
     data: Option<PathBuf>,
     /// Only the first frames of each trial, at 30 a second
     #[arg(long, default_value_t = 400, value_name = "N")]
     frames: usize,
-    /// Write the errors to this file; what was in it is replaced
+    /// Write the errors to this file; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -286,11 +286,11 @@ fn print(json: &Json) {
         println!("{views} views: {solves_per_second:.0} solves a second of {steps} steps, one thread{paper}");
     }
     for Trials { action, names, frames } in &json.trials {
-        println!("{action}: {frames} frames of {}", names.join(" "));
+        println!("{action}: {} of {}", counted(frames, "frame"), names.join(" "));
     }
     if json.synthetic {
         println!(
-            "\nThe motion is synthetic: its figures say nothing of recorded motion, and don't compare with the paper."
+            "\nThe motion is synthetic: its figures say nothing about recorded motion and are not comparable with the paper's."
         );
     } else {
         let tuned_on = TUNED_ON.join(" and ");

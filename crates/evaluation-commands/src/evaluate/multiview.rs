@@ -32,12 +32,12 @@ use texture::Texture;
 /// `marey evaluate multiview`
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png and groundtruth/joints.json; images/CAMERA/0000.jpg, where \
-there are any, show points of the person that are found again, and are the background of the overlays. The body's shape and its first pose are found in the first frame, without a starting pose; \
-then it is followed from frame to frame.
+DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png and groundtruth/joints.json; images/CAMERA/0000.jpg, if \
+there are any, show points of the person that are found again, and are the background of the overlays. The body's shape and its first pose \
+are found in the first frame, without a starting pose; then it is followed from frame to frame.
 
-Joints are compared by name. Beside the result stand two that need less: local optimisation without particles, and the first pose kept \
-for all frames.
+Joints are compared by name. Two simpler methods are shown for comparison: local optimisation without particles, and the first pose, moved along \
+rigidly for all frames.
 
 Examples:
   marey evaluate multiview capture/ --json errors.json
@@ -72,11 +72,11 @@ pub struct Args {
     /// Measure how long a particle search takes in every N-th frame, without using what it finds; 0 for none
     #[arg(long, value_name = "N", default_value_t = 8)]
     time_search_every: usize,
-    /// Write the errors to this file; what was in it is replaced
+    /// Write the errors to this file; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a film for each camera, with the outline of the body found, to this folder; those of the
-    /// same names are replaced
+    /// Write a film for each camera, with the outline of the body found, to this folder; existing
+    /// films of the same names are overwritten
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
     /// Frames a second of these films

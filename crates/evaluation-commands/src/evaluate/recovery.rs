@@ -9,7 +9,7 @@ use body::BodyModel;
 use clap::ValueEnum;
 use client::{numbers::finite, outputs};
 use evaluation::recovery::{Limbs, Method, Setting, recover};
-use model::shown;
+use model::{counted, shown};
 use tracking::built_in_poses;
 use vision::scene::Ring;
 
@@ -31,7 +31,7 @@ angle, and every way to find the pose again starts from there: local optimisatio
 with and without the prior, and all that Marey does in a frame. Found means that all joints are within 50 mm of the truth.
 
 Poses are chosen to be as different as possible. Bodies have the poses of a third of the performers, the prior is made of the poses \
-of another third (about a hundred); the last third is there to try settings on (--part tune). Without --motion, bodies have poses of \
+of another third (about a hundred); the last third is for trying settings on (--part tune). Without --motion, bodies have poses of \
 synthetic motion and the prior is the built-in one.
 
 Examples:
@@ -63,7 +63,7 @@ pub struct Args {
     /// A different seed gives different bodies and particles; the same seed gives the same
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Write the distances of every start to this file; what was in it is replaced
+    /// Write the distances of every start to this file; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -110,7 +110,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let ring = Ring { cameras: args.cameras as usize, size: SIZE, focal: FOCAL, ..Ring::default() };
     let cameras = ring.cameras();
     let noise = if args.noise { "noisy" } else { "exact" };
-    eprintln!("{note}; {} cameras, {noise} silhouettes", cameras.len());
+    eprintln!("{note}; {}, {noise} silhouettes", counted(cameras.len(), "camera"));
     let cells = args.limbs.len() * args.turned.len();
     let bar = Progress::new(cells * drawn.len(), "starts")?;
     let mut found = Vec::new();
@@ -131,7 +131,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }
     }
     bar.finish();
-    let table = report::table(&found, format!("{note}; {} cameras, {noise} silhouettes", cameras.len()));
+    let table =
+        report::table(&found, format!("{note}; {}, {noise} silhouettes", counted(cameras.len(), "camera")));
     println!("{}\n{}\n\n{}", table.title, table.note, table.text().trim_end());
     report::print_claim(&found);
     if let Some(path) = &args.json {

@@ -10,7 +10,7 @@ use evaluation::{
 };
 use formats::{BvhOptions, FileRole, archive, points_csv, session, session::MotionFormat};
 use kinematics::{Parametrisation, References};
-use model::Motion;
+use model::{Motion, counted};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -27,7 +27,7 @@ const MAX_BYTES: u64 = 2 << 30;
 /// `marey evaluate run`
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-The truth is the session's file of role ground-truth (an AMC on the session's skeleton, or a BVH), also when it was uploaded after the \
+The truth is the session's file of ground truth (an AMC on the session's skeleton, or a BVH), also when it was uploaded after the \
 run. Runs on cameras and by inverse kinematics have a body of their own: their joints are compared, by name, with true ones.
 
 Examples:
@@ -36,17 +36,16 @@ Examples:
   marey evaluate run \"take 3\" --truth truth.amc
   marey evaluate run \"synthetic walk\" --truth capture/groundtruth/joints.json")]
 pub struct Args {
-    /// The run: its id, or the name of a session, whose newest run is meant
+    /// The run: its id, or a session's name for its newest run
     run: String,
     /// The true motion: AMC or BVH, also .zst; true joints for a run on cameras: .json, .csv, .trc or .c3d [default: the
     /// session's ground-truth file]
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Write a report to this file, one page with tables and plots, to be opened in a browser; what was in the file is
-    /// replaced
+    /// Write a report to this file, one page with tables and plots, to be opened in a browser; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Write the errors, by frame and by joint, to this file; what was in it is replaced
+    /// Write the errors, by frame and by joint, to this file; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     #[command(flatten)]
@@ -89,20 +88,25 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
     let run: Run = client.get(&format!("/v1/runs/{}", client.find_run(&args.run)?))?;
     if run.state != "succeeded" {
-        bail!("run {} is {}, expected succeeded; see `marey status {}`", run.id, run.state, run.id);
+        let state = match run.state.as_str() {
+            "failed" => "failed".to_owned(),
+            "cancelled" => "was cancelled".to_owned(),
+            state => format!("is {state}, not finished yet"),
+        };
+        bail!("run {} {state}; see `marey status {}`", run.id, run.id);
     }
     let downloads = Downloads { client: &client, folder: tempfile::tempdir()? };
     match run.kind.as_str() {
         "sparse" => {}
         "multi-view" | "inverse-kinematics" => return joints(args, &downloads, &run),
-        kind => bail!("run {} is of kind {kind}, which produces no motion", run.id),
+        kind => bail!("run {} ({kind}) produces no motion", run.id),
     }
     let session = run.session_id.as_deref().context("the run's session has been deleted")?;
     let files = inputs(args, &downloads, session)?;
     let Some(truth) = only(&files, FileRole::GroundTruth)? else {
         bail!(
-            "run {} has no truth to be compared with: its session has no file of role ground-truth; upload the true motion on \
-             the session's skeleton (`marey upload {session} truth.amc`, or a .bvh), or give it: `marey evaluate run {} --truth FILE`",
+            "run {} can't be compared: its session has no file of ground truth; upload the true motion on the session's \
+             skeleton (`marey upload {session} truth.amc`, or a .bvh), or give it: `marey evaluate run {} --truth FILE`",
             run.id,
             run.id
         );
@@ -127,8 +131,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     println!("run {} compared with {name}\n{}", run.id, table.text().trim_end());
     if truth.num_frames() != found.num_frames() {
         println!(
-            "the truth has {} frames at 60 a second, the result {}: the frames that both have were compared",
-            truth.num_frames(),
+            "the truth has {} at 60 a second, the result {}: the frames that both have were compared",
+            counted(truth.num_frames(), "frame"),
             found.num_frames()
         );
     }
@@ -142,27 +146,32 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// How a run that has a body of its own found it.
+fn used(kind: &str) -> &'static str {
+    if kind == "multi-view" { "used cameras" } else { "used inverse kinematics" }
+}
+
 /// The joints of a run that has a body of its own, beside true ones.
 fn joints(args: &Args, downloads: &Downloads<'_>, run: &Run) -> anyhow::Result<()> {
     let Some(path) = &args.truth else {
         bail!(
-            "run {} is of kind {}: give the true joints by --truth FILE (.json of `marey sample-capture`, .csv, .trc or .c3d)",
+            "run {} {}: give the true joints by --truth FILE (.json of `marey sample-capture`, .csv, .trc or .c3d)",
             run.id,
-            run.kind
+            used(&run.kind)
         );
     };
     if args.html.is_some() {
-        bail!("--html is for runs from control points; run {} is of kind {}", run.id, run.kind);
+        bail!("--html is for runs from control points only; run {} {}", run.id, used(&run.kind));
     }
     let truth = run_joints::read_truth(path)?;
     let found = points_csv::read(&downloads.result(&run.id, "joints.csv")?)?.value;
     let first = run.parameters["parameters"]["first_frame"].as_u64().unwrap_or(0) as usize;
     let report = run_joints::compare(&found, &truth, first)?;
     println!(
-        "run {} compared with {}, {} frames\n{}",
+        "run {} compared with {}, {}\n{}",
         run.id,
         path.display(),
-        report.frames,
+        counted(report.frames, "frame"),
         report.text().trim_end()
     );
     if let Some(path) = &args.json {

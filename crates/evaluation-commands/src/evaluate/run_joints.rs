@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use anyhow::{Context, bail};
 use formats::session::{self, Options};
-use model::PointTrajectories;
+use model::{PointTrajectories, counted};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -65,7 +65,8 @@ pub fn read_truth(path: &Path) -> anyhow::Result<PointTrajectories> {
 fn from_json(bytes: &[u8]) -> anyhow::Result<PointTrajectories> {
     let JointsFile { fps, joint_names, frames } = serde_json::from_slice(bytes)?;
     if let Some(index) = frames.iter().position(|frame| frame.joints.len() != joint_names.len()) {
-        bail!("frame {index} has {} joints, expected {}", frames[index].joints.len(), joint_names.len());
+        let found = counted(frames[index].joints.len(), "joint");
+        bail!("frame {index} has {found}, expected {}", joint_names.len());
     }
     let positions = frames.iter().flat_map(|frame| frame.joints.iter().copied().map(Vector3::from)).collect();
     Ok(PointTrajectories::new(joint_names, fps, positions)?)

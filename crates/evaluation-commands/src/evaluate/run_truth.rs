@@ -19,7 +19,7 @@ pub fn only(files: &[File], role: FileRole) -> anyhow::Result<Option<&File>> {
     let found: Vec<&File> = files.iter().filter(|file| file.role == role).collect();
     if found.len() > 1 {
         let names = found.iter().map(|file| file.name.as_str()).collect::<Vec<_>>().join(", ");
-        bail!("session has {} files of role {role} ({names}), expected one", found.len());
+        bail!("the session has {} ({names}); keep one", role.counted(found.len()));
     }
     Ok(found.first().copied())
 }
@@ -31,12 +31,8 @@ pub fn true_motion(
     found: &Motion,
     reading: &session::Options,
 ) -> anyhow::Result<Motion> {
-    let format = MotionFormat::from_name(&truth.name).with_context(|| {
-        format!(
-            "{}: found a file of another kind, expected an AMC or BVH file for role {}",
-            truth.name, truth.role
-        )
-    })?;
+    let format = MotionFormat::from_name(&truth.name)
+        .with_context(|| format!("{}: not a {} file", truth.name, FileRole::GroundTruth.endings()))?;
     let acclaim =
         match skeleton.filter(|file| SkeletonFormat::from_name(&file.name) == Some(SkeletonFormat::Asf)) {
             Some(file) if format == MotionFormat::Amc => {

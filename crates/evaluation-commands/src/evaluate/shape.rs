@@ -54,11 +54,11 @@ pub struct Args {
     /// Which frame of the capture
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
-    /// Write the errors to this file; what was in it is replaced
+    /// Write the errors to this file; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a picture for each camera, with the outline of the body found, to this folder; those of
-    /// the same names are replaced
+    /// Write a picture for each camera, with the outline of the body found, to this folder; existing
+    /// pictures of the same names are overwritten
     #[arg(long, value_name = "DIR", conflicts_with = "scans")]
     overlay: Option<PathBuf>,
     /// Folder of registered scans: vertices.npy, faces.npy, joints.npy and scans.csv, with rig.json, skin_joints.npy and

@@ -53,7 +53,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Part::All)]
     part: Part,
     /// Trials reconstructed at once [default: as many as there are processors]; the errors do not depend on it, frames/s are those of
-    /// one trial and honest with 1 only
+    /// one trial and only meaningful with 1 thread
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
     #[command(flatten)]
@@ -98,7 +98,10 @@ pub(super) enum Part {
 }
 
 fn positive(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| format!("{text:?} is not a number of frames"))
+    text.parse()
+        .ok()
+        .filter(|n| *n > 0)
+        .ok_or_else(|| format!("found {text:?}, expected a number of frames, 1 or more"))
 }
 
 /// Runs `marey evaluate sparse`.

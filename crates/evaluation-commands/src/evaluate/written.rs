@@ -9,6 +9,7 @@ use evaluation::{
     report::{About, sparse_report},
     tables::{Table, comparison_tables, papers, reference, table, tables},
 };
+use model::counted;
 use serde::Serialize;
 use serde_json::Value;
 use sparse::Parameters;
@@ -16,14 +17,13 @@ use sparse::Parameters;
 /// Files to be written.
 #[derive(Debug, clap::Args)]
 pub struct Written {
-    /// Write rows, tables and the errors of each trial to this file; what was in it is replaced
+    /// Write rows, tables and the errors of each trial to this file; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the tables to this file, as Markdown; what was in it is replaced
+    /// Write the tables to this file, as Markdown; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-    /// Write a report to this file, one page with tables and plots, to be opened in a browser; what was in the file is
-    /// replaced
+    /// Write a report to this file, one page with tables and plots, to be opened in a browser; overwritten if it exists
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
 }
@@ -69,7 +69,7 @@ impl Outcome<'_> {
         print!("{}", table(self.rows));
         if self.synthetic {
             println!(
-                "\nThe motion is synthetic: its figures say nothing of recorded motion, and don't compare with the papers."
+                "\nThe motion is synthetic: its figures say nothing about recorded motion and are not comparable with the papers'."
             );
         } else {
             self.print_papers();
@@ -148,12 +148,15 @@ impl Outcome<'_> {
             ),
             (
                 "database".to_owned(),
-                format!("{} clips, {poses} poses at 60 a second", evaluation.train.len()),
+                format!("{}, {poses} poses at 60 a second", counted(evaluation.train.len(), "clip")),
             ),
-            ("took".to_owned(), format!("{:.0} s with {} trials at once", self.seconds, evaluation.threads)),
+            (
+                "took".to_owned(),
+                format!("{:.0} s with {} at once", self.seconds, counted(evaluation.threads, "trial")),
+            ),
         ];
         if !self.tuning.is_empty() {
-            facts.push(("defaults tuned on".to_owned(), format!("{} other trials", self.tuning.len())));
+            facts.push(("defaults tuned on".to_owned(), counted(self.tuning.len(), "other trial")));
         }
         About {
             title: "How well motion is reconstructed".to_owned(),
@@ -164,7 +167,8 @@ impl Outcome<'_> {
             command: command(),
             parameters: parameters.as_object().into_iter().flatten().map(|(n, v)| (n.clone(), word(v))).collect(),
             warning: if self.synthetic {
-                "The motion is synthetic: its figures say nothing of recorded motion, and don't compare with the papers.".to_owned()
+                "The motion is synthetic: its figures say nothing about recorded motion and are not comparable with the papers'."
+                    .to_owned()
             } else {
                 String::new()
             },

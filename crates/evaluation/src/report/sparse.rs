@@ -1,3 +1,5 @@
+use model::counted;
+
 use super::{
     READING, curves,
     page::{About, page, section, table_html, table_section},
@@ -68,10 +70,7 @@ impl<'a> View<'a> {
     }
 
     fn points(&self) -> Vec<(String, Case)> {
-        self.beside(&|c| format!("{} points", c.points), &|c| Case {
-            points: c.points,
-            ..self.reference.clone()
-        })
+        self.beside(&|c| counted(c.points, "point"), &|c| Case { points: c.points, ..self.reference.clone() })
     }
 
     fn variants(&self) -> Vec<(String, Case)> {
@@ -85,7 +84,7 @@ impl<'a> View<'a> {
     }
 
     fn databases(&self) -> Vec<(String, Case)> {
-        let name = |c: &Case| format!("{} poses", c.database_poses);
+        let name = |c: &Case| counted(c.database_poses, "pose");
         self.beside(&name, &|c| Case { database_poses: c.database_poses, ..self.reference.clone() })
     }
 
@@ -97,7 +96,12 @@ impl<'a> View<'a> {
     /// The reference case in words.
     fn reference(&self) -> String {
         let Case { method, points, database_poses, .. } = &self.reference;
-        format!("{method}, {points} points, {database_poses} poses, protocol {}", self.protocol)
+        format!(
+            "{method}, {}, {}, protocol {}",
+            counted(points, "point"),
+            counted(database_poses, "pose"),
+            self.protocol
+        )
     }
 
     fn over_time(&self) -> String {
@@ -115,7 +119,7 @@ impl<'a> View<'a> {
         for (what, cases) in shown {
             let series: Vec<Series> =
                 cases.iter().filter_map(|(name, case)| self.curve(name.clone(), case)).collect();
-            let caption = format!("{what}. Elsewhere as {}.", self.reference());
+            let caption = format!("{what}. Otherwise as {}.", self.reference());
             let plot = LinePlot {
                 caption: &caption,
                 x_label: "time since the trial began, seconds",
@@ -151,7 +155,8 @@ impl<'a> View<'a> {
                 curves::around_gap(format!("hidden: {name}"), &series[0]),
                 curves::around_gap("the same frames, nothing hidden".to_owned(), &series[1]),
             ];
-            let caption = format!("Points hidden ({name}) from 0 s on, shaded. Else {}.", self.reference());
+            let caption =
+                format!("Points hidden ({name}) from 0 s on, shaded. Otherwise as {}.", self.reference());
             let plot = LinePlot {
                 caption: &caption,
                 x_label: "time since the points were hidden, seconds",

@@ -1,5 +1,7 @@
 //! Tables laid out as the papers' own, with the papers' rows in them.
 
+use model::counted;
+
 use super::{
     axes::{Axes, Axis},
     note, papers,
@@ -61,7 +63,7 @@ impl<'a> Grid<'a> {
 pub fn points(rows: &[Row], axes: &Axes, beside_papers: bool) -> Table {
     let grid = Grid::new(rows, axes, &[Axis::Points], Axis::Points);
     let mut columns = vec!["method".to_owned(), "error, degrees".to_owned()];
-    columns.extend(grid.columns.iter().map(|c| format!("{} points", c.points)));
+    columns.extend(grid.columns.iter().map(|c| counted(c.points, "point")));
     let title =
         if beside_papers { "Control points, beside table 1 of Mousas et al." } else { "Control points" };
     let papers = if beside_papers { PAPERS } else { "" };
@@ -116,7 +118,7 @@ pub fn databases(rows: &[Row], axes: &Axes, beside_papers: bool) -> Table {
     let free = [Axis::Database, Axis::Points];
     let grid = Grid::new(rows, axes, &free, Axis::Database);
     let mut columns = vec!["method".to_owned(), "points".to_owned(), "measure".to_owned()];
-    columns.extend(grid.columns.iter().map(|c| format!("{} poses", c.database_poses)));
+    columns.extend(grid.columns.iter().map(|c| counted(c.database_poses, "pose")));
     let title = if beside_papers {
         "Database size, beside table 2 of Mousas et al. and Liu et al."
     } else {

@@ -11,6 +11,7 @@ pub use table::{Cell, Table};
 
 use crate::{Case, Row, summary::ALL};
 use axes::{Axes, Axis};
+use model::counted;
 
 /// All tables that the rows give, for reports. `beside_papers`: whether the motion was recorded, so that the papers' figures say something
 /// beside it.
@@ -112,7 +113,9 @@ fn note(rows: &[Row]) -> String {
         return String::new();
     };
     format!(
-        "Protocol {}; {} trials, {} frames; means over trials (standard deviation over trials).",
-        row.protocol, row.trials, row.frames
+        "Protocol {}; {}, {}; means over trials (standard deviation over trials).",
+        row.protocol,
+        counted(row.trials, "trial"),
+        counted(row.frames, "frame")
     )
 }

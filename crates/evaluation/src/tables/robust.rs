@@ -81,10 +81,9 @@ pub fn gaps(rows: &[Row]) -> Option<Table> {
     let with_gaps: Vec<&Row> = rows.iter().filter(|r| r.action == ALL && r.gap.is_some()).collect();
     let row = with_gaps.first()?;
     let text = format!(
-        "Protocol {}. Every number stands beside that of the same frames of the same trials with nothing hidden (in \
-         brackets). After: the half second after the gap. Recovered: from then on at most a quarter and half a degree worse than \
-         without the gap for a tenth of a second; the time is the median over the trials that did. Trials shorter than the gap \
-         and a second are left out.",
+        "Protocol {}. In brackets: the same frames of the same trials with nothing hidden. After: the half second after the \
+         gap. Recovered: from then on at most a quarter and half a degree worse than without the gap for a tenth of a second; \
+         the time is the median over the trials that did. Trials shorter than the gap and a second are left out.",
         row.protocol
     );
     let columns = [

@@ -151,7 +151,7 @@ fn joint(
     }
     let name = names.unique(&given);
     if name != given {
-        warnings.line(line, format!("a second joint named {given} is called {name}"));
+        warnings.line(line, format!("two joints are named {given}; the second was renamed {name}"));
     }
     Ok(RawJoint { line, name, parent, offset: Vector3::zeros(), tip: None, channels: Vec::new() })
 }

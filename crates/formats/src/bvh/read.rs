@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use model::{Channel, ChannelKind, Joint, Motion, Skeleton};
+use model::{Channel, ChannelKind, Joint, Motion, Skeleton, counted};
 
 use super::{
     Options,
@@ -43,7 +43,8 @@ pub fn read(bytes: &[u8], options: &Options) -> Result<Read<Motion>> {
     }
     if Some(found as u64) != declared {
         let declared = declared.map_or("an unknown number of".into(), |n| n.to_string());
-        let message = format!("the file declares {declared} frames and has {found}; all {found} are read");
+        let message =
+            format!("the file declares {} and has {found}; all {found} are read", counted(declared, "frame"));
         warnings.add(Place::File, message);
     }
     let joints = joints(&raw, options.metres_per_unit);
@@ -119,7 +120,7 @@ fn values(lines: &mut Lines<'_>, channels: &[Channel], metres_per_unit: f64) -> 
 fn wrong_count(line: Line<'_>, found: usize, expected: usize) -> Error {
     Error::at_line(
         line.number,
-        format!("{found} values"),
+        counted(found, "value"),
         format!("{expected}, one for each channel of the hierarchy"),
     )
 }

@@ -1,4 +1,4 @@
-use model::shown;
+use model::{counted, shown};
 
 use super::{
     bytes::Processor,
@@ -46,7 +46,10 @@ impl Header {
         }
         if count("USED").is_some_and(|used| used != points as u64) {
             let used = count("USED").unwrap_or_default();
-            warnings.add(Place::Byte(2), format!("the header has {points} points, POINT:USED is {used}"));
+            warnings.add(
+                Place::Byte(2),
+                format!("the header has {}, POINT:USED is {used}", counted(points, "point")),
+            );
         }
         let scale = number("SCALE").filter(|s| *s != 0.0).unwrap_or(float(7));
         if !scale.is_finite() || scale == 0.0 {
@@ -87,13 +90,14 @@ impl Header {
         let there = (bytes.len() - self.data) / self.frame_bytes();
         let Some((place, frames)) = stated.iter().find(|(_, frames)| *frames <= there as u64) else {
             let expected = stated.first().map_or("at least one frame".into(), |(place, frames)| {
-                format!("{frames} frames as {place} says, {} bytes each", self.frame_bytes())
+                format!("{} as {place} says, {} bytes each", counted(frames, "frame"), self.frame_bytes())
             });
-            let found = format!("data for {there} frames");
+            let found = format!("data for {}", counted(there, "frame"));
             return Err(at_byte(self.data as u64, found, expected));
         };
         for (other, number) in stated.iter().filter(|(_, number)| number != frames) {
-            let message = format!("{other} says {number} frames; the {frames} of {place} are read");
+            let message =
+                format!("{other} says {}; the {frames} of {place} are read", counted(number, "frame"));
             warnings.add(Place::File, message);
         }
         // at most what is there, so it fits

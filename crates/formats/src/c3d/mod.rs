@@ -6,14 +6,10 @@ mod header;
 mod parameters;
 mod write;
 
-use model::{Axis, PointTrajectories};
+use model::{Axis, PointTrajectories, counted};
 
 use crate::{
-    Error, Place, PointsOptions, Read, Result,
-    error::at_byte,
-    points,
-    points::PointNames,
-    read::{Warnings, counted},
+    Error, Place, PointsOptions, Read, Result, error::at_byte, points, points::PointNames, read::Warnings,
     text::quote,
 };
 pub use write::write;
@@ -45,7 +41,7 @@ pub fn read(bytes: &[u8], options: &PointsOptions) -> Result<Read<PointTrajector
             let stated = up_of_screen(&parameters, &mut Warnings::default());
             if let Some(stated) = stated.ok().filter(|stated| is_stated(&parameters) && *stated != up) {
                 let message = format!(
-                    "POINT:Y_SCREEN says that {} is up; the points are turned from {} up all the same, as asked for",
+                    "POINT:Y_SCREEN says {} is up; the {} that was asked for is taken instead",
                     points::letter(stated),
                     points::letter(up)
                 );

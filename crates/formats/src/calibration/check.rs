@@ -1,6 +1,6 @@
 //! Whether cameras can stand as a calibration says.
 
-use model::Camera;
+use model::{Camera, counted};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::{Error, Place, Result, read::Warnings};
@@ -95,8 +95,11 @@ fn check_directions(
     };
     let away: Vec<_> = cameras.iter().zip(rays.iter().map(off)).filter(|(_, off)| *off > WIDEST).collect();
     if 2 * away.len() > cameras.len() {
-        let found =
-            format!("{} of {} cameras that look away from the common point", away.len(), cameras.len());
+        let found = format!(
+            "{} of {} that look away from the common point",
+            away.len(),
+            counted(cameras.len(), "camera")
+        );
         let hint = "cameras that look at the same, with x_camera = R x + t and z forward";
         let is_inverted = look_inwards_if_inverted(cameras);
         let hint = if is_inverted { INVERTED } else { hint };
@@ -129,7 +132,7 @@ fn check_upper_sides(cameras: &[Camera], is_up_certain: bool, warnings: &mut War
     let down: Vec<_> = cameras.iter().filter(|camera| upper_side(camera) < -0.5).collect();
     if is_up_certain && 2 * down.len() > cameras.len() {
         return Err(Error::whole_file(
-            format!("{} of {} cameras upside down", down.len(), cameras.len()),
+            format!("{} of {} upside down", down.len(), counted(cameras.len(), "camera")),
             "the floor below the cameras; give the axis that points up if the file has another",
         ));
     }

@@ -2,6 +2,7 @@
 
 use std::{cmp::Ordering, collections::BTreeSet};
 
+use model::counted;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde_json::{Map, Value};
 
@@ -81,7 +82,7 @@ struct Part<'a> {
 fn parts<'a>(file_name: &str, tree: &'a Value) -> Result<Vec<Part<'a>>> {
     let parts_from = |list: &'a [Value]| {
         if list.len() > MOST_CAMERAS {
-            let found = format!("{} cameras", list.len());
+            let found = counted(list.len(), "camera");
             return Err(Error::whole_file(found, format!("at most {MOST_CAMERAS}")));
         }
         let part = |(index, value): (usize, &'a Value)| {
@@ -171,7 +172,7 @@ impl Part<'_> {
         let numbers = numbers(value)
             .ok_or_else(|| self.error(format!("{what} {}", quote(value.to_string().as_bytes())), expected))?;
         if !counts.is_empty() && !counts.contains(&numbers.len()) {
-            return Err(self.error(format!("{what} of {} numbers", numbers.len()), expected));
+            return Err(self.error(format!("{what} of {}", counted(numbers.len(), "number")), expected));
         }
         Ok(numbers)
     }

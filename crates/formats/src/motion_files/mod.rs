@@ -6,7 +6,7 @@ mod pairing;
 mod path;
 mod skeletons;
 
-use model::Motion;
+use model::{Motion, counted};
 
 use crate::{
     Error, Place, Read, Result, Warning, amc,
@@ -105,7 +105,8 @@ pub fn clips(entries: &[Entry], options: &Options) -> Result<Read<Vec<MotionFile
         warnings.extend(in_file.map(|message| Warning { place: Place::File, message }));
         let name = names.unique(path.stem);
         if name != path.stem {
-            let message = format!("{}: a second motion named {} is called {name}", entry.name, path.stem);
+            let message =
+                format!("{}: two motions are named {}; the second was renamed {name}", entry.name, path.stem);
             warnings.push(Warning { place: Place::File, message });
         }
         let subject = row.map(|r| r.subject.clone()).filter(|s| !s.is_empty());
@@ -118,8 +119,8 @@ pub fn clips(entries: &[Entry], options: &Options) -> Result<Read<Vec<MotionFile
     }
     if clips.is_empty() {
         let skipped = warnings.iter().map(|w| w.message.as_str()).next();
-        let found =
-            skipped.map_or_else(|| format!("{} files, no motion among them", files.len()), str::to_owned);
+        let found = skipped
+            .map_or_else(|| format!("{}, no motion among them", counted(files.len(), "file")), str::to_owned);
         return Err(Error::whole_file(found, "at least one AMC file with its ASF file, or a BVH file"));
     }
     Ok(Read { value: clips, warnings })

@@ -3,13 +3,10 @@
 mod header;
 mod values;
 
-use model::Mesh;
+use model::{Mesh, counted};
 use nalgebra::Vector3;
 
-use crate::{
-    Error, Place, Read, Result,
-    read::{Warnings, counted},
-};
+use crate::{Error, Place, Read, Result, read::Warnings};
 use header::{Element, Header, Property};
 use values::Values;
 

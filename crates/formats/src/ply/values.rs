@@ -1,3 +1,5 @@
+use model::counted;
+
 use super::header::{Element, Encoding, Header, Kind, Property};
 use crate::{
     Error, Place, Result,
@@ -31,7 +33,7 @@ impl<'a> Values<'a> {
         // the last number of a text needs no blank after it
         let room = self.bytes.len() - self.at + 1;
         if element.count.checked_mul(least).is_none_or(|bytes| bytes > room) {
-            let found = format!("{} bytes of data", room - 1);
+            let found = format!("{} of data", counted(room - 1, "byte"));
             let expected =
                 format!("{} items of {:.40}, {least} bytes each or more", element.count, element.name);
             return Err(self.unexpected(found, expected));
@@ -53,7 +55,10 @@ impl<'a> Values<'a> {
             return number(word).ok_or_else(|| self.unexpected(quote(word), "a number"));
         }
         let Some(found) = self.bytes.get(self.at..self.at + kind.bytes()) else {
-            return Err(self.unexpected("the end of the file", format!("a number of {} bytes", kind.bytes())));
+            return Err(self.unexpected(
+                "the end of the file",
+                format!("a number of {}", counted(kind.bytes(), "byte")),
+            ));
         };
         let mut little = [0; 8];
         little[..found.len()].copy_from_slice(found);

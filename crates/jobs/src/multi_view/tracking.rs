@@ -15,7 +15,7 @@ pub const TRACKED: &str = "tracked.bin";
 pub struct FitShape {
     /// what the plan was given
     pub request: PlanMultiView,
-    /// what was sloppy about the files
+    /// problems in the files
     pub warnings: Vec<String>,
     /// what the plan itself took
     pub plan: JobReport,

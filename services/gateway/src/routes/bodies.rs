@@ -62,7 +62,7 @@ pub(crate) struct BodyQuery {
 
 /// Download a body of a model as GLB
 ///
-/// With skeleton and skin, for Blender and three.js: the mean body, or the most probable one with the measurements said.
+/// With skeleton and skin, for Blender and three.js: the mean body, or the most probable one with the given measurements.
 #[utoipa::path(
     get, path = "/v1/body-models/{body_model}/body.glb", tag = "body models",
     params(

@@ -52,7 +52,7 @@ pub(super) async fn show(Reader(by): Reader, Path(which): Path<String>) -> Resul
 
 /// Delete a body model
 ///
-/// With the scans that it was built from. Refused (409, with who it is) while it is being built or a run uses it. What
+/// With the scans that it was built from. Refused (409, naming the users) while it is being built or a run uses it. What
 /// finished runs made with it stays.
 #[utoipa::path(
     delete, path = "/v1/body-models/{body_model}", tag = "body models",

@@ -77,7 +77,7 @@ pub(super) async fn clips(Reader(by): Reader, Path(which): Path<String>) -> Resu
 
 /// Delete a motion database
 ///
-/// With the files that it was built from and the models trained on it. Refused (409, with who it is) while it is being
+/// With the files that it was built from and the models trained on it. Refused (409, naming the users) while it is being
 /// built, a run uses it, or a version that is not built yet is to be made from it. What finished runs made with it, and
 /// versions that were made from it, stay.
 #[utoipa::path(

@@ -23,13 +23,13 @@ pub(crate) struct Health {
     status: &'static str,
 }
 
-/// Is the process alive
+/// Liveness
 #[utoipa::path(get, path = "/healthz", tag = "operations", security(()), responses((status = 200, body = Health)))]
 pub(super) async fn healthz() -> Json<Health> {
     Json(Health { status: "ok" })
 }
 
-/// Can it serve
+/// Readiness
 ///
 /// Whether the database and the object store answer; 503 when not.
 #[utoipa::path(get, path = "/readyz", tag = "operations", security(()), responses((status = 200, body = Health)))]

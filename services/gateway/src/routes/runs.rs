@@ -94,7 +94,7 @@ pub(super) async fn show(
 
 /// Cancel a run
 ///
-/// What waits ends at once, what runs within moments. A run that has ended stays as it is.
+/// Waiting jobs end at once, running ones within moments. A run that has ended stays as it is.
 #[utoipa::path(
     post, path = "/v1/runs/{run_id}/cancel", tag = "runs",
     params(("run_id" = Uuid, Path,)), responses((status = 200, body = RunWithJobs)),

@@ -32,7 +32,7 @@ pub(crate) struct PutQuery {
     /// ground truth; `.toml`, `.json`, `.yml`, `.xml`, `.qca.txt` calibration; `.mp4`, `.mov`, `.m4v`,
     /// `.avi`, `.mkv`, `.webm` video; `.png`, `.jpg` plate; archives masks, or images or plates
     /// if their name says so
-    #[param(schema_with = files::role_schema)]
+    #[param(schema_with = files::session_role_schema)]
     role: Option<FileRole>,
 }
 
@@ -72,25 +72,7 @@ pub(super) async fn put(
     body: Body,
 ) -> Result<(StatusCode, Json<File>)> {
     names::check_file_name(&name)?;
-    if let Some((role, made)) = query.role.and_then(|role| Some((role, role.elsewhere()?))) {
-        return Err(Error::Unprocessable(format!(
-            "role {role} is for files that {made} are built from, not for those of a session: upload {name:?} to one of \
-             the {made}"
-        )));
-    }
-    // a role that is stated would not help: no role has files of that ending
-    let role = query.role.or_else(|| FileRole::from_session_file(&name)).ok_or_else(|| {
-        Error::Unprocessable(format!(
-            "{name:?} ends like no file of a session, expected one of: {}",
-            FileRole::session_endings()
-        ))
-    })?;
-    if !role.fits_session_file(&name) {
-        return Err(Error::Unprocessable(format!(
-            "{name:?} can't have role {role}: expected {}",
-            role.endings()
-        )));
-    }
+    let role = FileRole::in_session(&name, query.role).map_err(|e| Error::Unprocessable(e.to_string()))?;
     let announced = Announced::read(&headers)?;
     let mut db = app.db.acquire().await?;
     sessions::find(&mut db, caller.project_id, session_id, Lock::None).await?;

@@ -22,7 +22,7 @@ const MAX_TAGS: usize = 32;
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NewSession {
-    /// what people call it; 1 to 200 characters
+    /// display name; 1 to 200 characters
     #[schema(example = "walk, take 3")]
     name: String,
     /// words to find it by; at most 32

@@ -93,14 +93,12 @@ impl SessionRun for InverseKinematicsRun {
         json!({
             "kind": "inverse-kinematics",
             "inverse_kinematics": {
-                "solver": "image-constrained",
                 "frame_rate": 30.0,
                 "stature_m": 1.78,
                 "mass_kg": 74.0,
                 "sex": "female",
             },
             "marker_set": "auto",
-            "cameras": ["cam01", "cam02"],
         })
     }
 

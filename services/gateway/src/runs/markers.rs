@@ -52,7 +52,7 @@ impl MarkerFields {
             return Ok(());
         }
         if !POINTS.contains(&self.points.len()) {
-            return refuse(format!("points has {} names, expected 2 to 16", self.points.len()));
+            return refuse(format!("names in points: {}, expected 2 to 16", self.points.len()));
         }
         let mut seen = BTreeSet::new();
         match self.points.iter().find(|name| !seen.insert(*name)) {

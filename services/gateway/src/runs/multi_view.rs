@@ -40,8 +40,7 @@ impl SessionRun for MultiViewRun {
         json!({
             "kind": "multi-view",
             "body_model": "shipped",
-            "cameras": ["cam01", "cam02", "cam03"],
-            "camera_files": {"GX010042.MP4": "cam01"},
+
             "background": "auto",
             "parameters": {"chunk_frames": 150, "particles": 25},
         })

@@ -50,7 +50,7 @@ impl BodyModel {
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NewBodyModel {
-    /// 1 to 64 letters, digits, `.`, `_` or `-`; a name that is there gets another version
+    /// 1 to 64 letters, digits, `.`, `_` or `-`; an existing name gets a new version
     #[schema(example = "athletes")]
     name: String,
 }

@@ -50,7 +50,7 @@ pub(crate) struct Contents {
     subjects: Vec<Share>,
     /// what was made from the recordings
     augment: Augment,
-    /// what was sloppy about the files
+    /// problems in the files
     warnings: Vec<String>,
 }
 

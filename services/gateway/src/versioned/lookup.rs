@@ -1,4 +1,4 @@
-//! Finding what a request names, in the caller's project only: what another project has is not there.
+//! Finding what a request names, in the caller's project only: other projects' items are not found.
 
 use sqlx::PgConnection;
 use uuid::Uuid;

@@ -67,7 +67,7 @@ impl MotionDatabase {
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NewMotionDatabase {
-    /// 1 to 64 letters, digits, `.`, `_` or `-`; a name that is there gets another version
+    /// 1 to 64 letters, digits, `.`, `_` or `-`; an existing name gets a new version
     #[schema(example = "walks")]
     name: String,
     /// a motion database that is ready, whose clips the new one begins with: id, `name` (its latest version that is

@@ -20,7 +20,7 @@ use crate::{
 /// What makes a noun of the mechanism.
 #[derive(Debug)]
 pub(crate) struct Noun {
-    /// what people call it
+    /// display name
     pub name: &'static str,
     /// path of all of them
     pub path: &'static str,

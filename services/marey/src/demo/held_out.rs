@@ -41,7 +41,7 @@ impl HeldOut {
         }
         let without_skeleton = format!(
             "no ASF file with the skeleton of {}: {}",
-            counted(without_skeleton.len() as u64, "AMC file"),
+            counted(without_skeleton.len(), "AMC file"),
             named(folder, &without_skeleton)
         );
         if takes.is_empty() {
@@ -73,7 +73,7 @@ impl HeldOut {
     /// If there are fewer than three.
     pub fn choose(mut takes: Vec<Take>) -> anyhow::Result<Self> {
         if takes.len() < 3 {
-            let found = counted(takes.len() as u64, "recorded trial");
+            let found = counted(takes.len(), "recorded trial");
             bail!("found {found} (ASF with AMC, or BVH), expected at least 3");
         }
         // where actions come in turn, so do those of every fifth take; by letters 100 would follow 1

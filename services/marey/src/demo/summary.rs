@@ -83,7 +83,7 @@ impl Summary {
             let _ = writeln!(out, "  {file:<width$}  {what}");
         }
         let folder = output.canonicalize().unwrap_or_else(|_| output.to_owned());
-        let _ = write!(out, "in {}", folder.display());
+        let _ = write!(out, "Everything is in {}", folder.display());
         out
     }
 
@@ -93,7 +93,7 @@ impl Summary {
         let kind = if self.is_synthetic { "synthetic trial" } else { "trial" };
         format!(
             "DONE in {:.0} s: {} reconstructed from 4 and from 6 of their points, each by two methods,\n\
-             and a person followed before {} cameras: {sessions} sessions, {runs} runs.\n",
+             and a person followed in front of {} cameras: {sessions} sessions, {runs} runs.\n",
             took.as_secs_f64(),
             counted(self.num_trials() as u64, kind),
             cameras::CAPTURE.cameras,
@@ -103,7 +103,7 @@ impl Summary {
     fn points_part(&self) -> String {
         let mut out = format!(
             "\nFROM A FEW POINTS: errors, mean over {} ± its standard error\n",
-            counted(self.num_trials() as u64, "trial")
+            counted(self.num_trials(), "trial")
         );
         let _ = writeln!(
             out,
@@ -115,11 +115,11 @@ impl Summary {
                 out.push_str(&self.row(points.len(), method));
             }
         }
-        let learned = counted(self.num_learned as u64, "other trial");
+        let learned = counted(self.num_learned, "other trial");
         let _ = write!(
             out,
-            "  The baseline searches and fits as Marey does, but predicts that the motion goes on as the one most similar\n  \
-             recording did (--method nearest); better: smaller error in angles. The trials were held out: Marey learned\n  \
+            "  The baseline searches and fits as Marey does, but predicts that the motion continues like the single most\n  \
+             similar recording (--method nearest); better: smaller error in angles. The trials were held out: Marey learned\n  \
              from {learned} of the same people.\n"
         );
         if self.is_synthetic {
@@ -210,13 +210,13 @@ impl Summary {
             expect("joint positions from 6 points, cm", mean(|e| e.mpjpe_cm), MOST_POSITIONS_CM);
         }
         let followed = &self.followed;
-        expect("joints before cameras on average, m", followed.mean_m, MOST_JOINTS_M);
-        expect("joints before cameras at most, m", followed.largest_m, MOST_JOINT_M);
+        expect("joints in front of cameras on average, m", followed.mean_m, MOST_JOINTS_M);
+        expect("joints in front of cameras at most, m", followed.largest_m, MOST_JOINT_M);
         let stature_off = (followed.stature_m - cameras::CAPTURE.stature_m()).abs();
         expect("stature, m off", stature_off, MOST_STATURE_M);
         if followed.num_frames < cameras::CAPTURE.frames {
             let expected = cameras::CAPTURE.frames;
-            short.push(format!("frames before cameras: {}, expected {expected}", followed.num_frames));
+            short.push(format!("frames in front of cameras: {}, expected {expected}", followed.num_frames));
         }
         let missing =
             self.places().into_iter().map(|(file, _)| file).filter(|file| !output.join(file).exists());
@@ -293,7 +293,7 @@ mod tests {
         assert_eq!(good.shortfalls(output.path()), ["picture.svg was not made"]);
         let mut lost = summary([4.0, 6.0], [5.0, 5.0]);
         lost.followed.largest_m = f64::NAN;
-        assert!(lost.shortfalls(output.path())[0].starts_with("joints before cameras at most, m: NaN"));
+        assert!(lost.shortfalls(output.path())[0].starts_with("joints in front of cameras at most, m: NaN"));
         Ok(())
     }
 }

@@ -6,7 +6,7 @@ use anyhow::Context;
 use client::{Client, MotionDatabase, Run, Session};
 use evaluation::{Picture, control_trajectories};
 use formats::{BvhOptions, FileRole};
-use model::Motion;
+use model::{Motion, counted};
 use serde::Deserialize;
 use serde_json::json;
 
@@ -84,8 +84,8 @@ pub fn reconstruct(
 ) -> anyhow::Result<Outcome> {
     let num_sessions = takes.len() * POINT_SETS.len();
     println!(
-        "Reconstructing {} trials from 4 and from 6 points: {num_sessions} sessions, {} runs",
-        takes.len(),
+        "Reconstructing {} from 4 and from 6 points: {num_sessions} sessions, {} runs",
+        counted(takes.len(), "trial"),
         num_sessions * METHODS.len()
     );
     let mut started = Vec::new();

@@ -12,6 +12,7 @@ use jobs::{
     multi_view::{CameraClips, CameraReport, frame_rate},
 };
 use kinematics::ControlPoint;
+use model::counted;
 use nalgebra::Vector3;
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::compute;
@@ -150,8 +151,9 @@ impl IkHandler {
                 let seen = end.saturating_sub(first);
                 if seen.abs_diff(frames.count) > 1 {
                     warnings.push(format!(
-                        "cameras have {seen} frames, the measured points {} at the same {rate} frames a second: only those that both \
-                         have are used, and both are taken to begin at the same moment",
+                        "the cameras have {}, the measured points {} at the same {rate} frames a second: only those that both have \
+                         are used, and both are assumed to begin at the same moment",
+                        counted(seen, "frame"),
                         frames.count
                     ));
                 }
@@ -170,9 +172,8 @@ impl IkHandler {
             outliers::check_unit(&measured, &reach, &chosen.points)?;
             if let Some(Outlier { frame, point }) = out.first() {
                 warnings.push(format!(
-                    "{} samples of measured points are farther from the others than a body reaches and are taken as not measured; \
-                     the first: {} in frame {frame}",
-                    out.len(),
+                    "{} of the measured points out of reach of a body; ignored (the first: {} in frame {frame})",
+                    counted(out.len(), "sample"),
                     chosen.points[*point].name
                 ));
             }

@@ -49,16 +49,16 @@ pub(super) fn doubts(solved: &[Solved]) -> Vec<String> {
     let bad = share(&|solved| solved.residual_m.is_some_and(|m| m > BAD_M));
     if bad > MANY {
         doubts.push(format!(
-            "in {:.0} % of the frames the body is more than 5 cm off the measured points: is it of another size, is a point named \
-             wrongly, is another axis up? see quality.csv",
+            "in {:.0} % of the frames the body is more than 5 cm off the measured points: check the stature, the point names and \
+             which axis is up; see quality.csv",
             100.0 * bad
         ));
     }
     let outside = share(&|solved| solved.overlap.is_some_and(|overlap| overlap < BAD_OVERLAP));
     if outside > MANY {
         doubts.push(format!(
-            "in {:.0} % of the frames limbs lie outside the silhouettes: do cameras and points have the same origin, axes and \
-             start? see quality.csv",
+            "in {:.0} % of the frames limbs lie outside the silhouettes: check that cameras and points have the same origin, axes \
+             and start; see quality.csv",
             100.0 * outside
         ));
     }

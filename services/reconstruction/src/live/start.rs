@@ -105,10 +105,14 @@ fn parameters(json: &str) -> Result<Parameters, CallError> {
         Err(sparse::Error::Parameter { name, found: found.to_owned(), expected }.into())
     };
     if parameters.smooth {
-        return refuse("smooth", "true", "false: a live stream knows no frames to come");
+        return refuse(
+            "smooth",
+            "true",
+            "false: smoothing needs future frames, which a live stream does not have",
+        );
     }
     if parameters.method == Method::Gplvm {
-        return refuse("method", "gplvm", "another one for a live stream: gplvm is for runs only");
+        return refuse("method", "gplvm", "another one for a live stream: gplvm works for runs only");
     }
     Ok(parameters)
 }

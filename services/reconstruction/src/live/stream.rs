@@ -193,7 +193,7 @@ impl Reader {
             let frame = match message {
                 Some(live_request::Message::Frame(frame)) => self.frame(frame),
                 Some(live_request::Message::Start(_)) => Err("a second start, expected frames".to_owned()),
-                None => Err("a message that is no frame".to_owned()),
+                None => Err("not a frame message, expected frames".to_owned()),
             };
             let frame = match frame {
                 Ok(frame) => frame,

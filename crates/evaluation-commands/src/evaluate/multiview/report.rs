@@ -173,7 +173,7 @@ impl Report {
 
     pub fn print(&self) {
         let Self { stages, local_only, first_pose_kept, .. } = self;
-        let columns = ["", "Marey", "local only", "first pose kept", "paper"];
+        let columns = ["", "Marey", "local only", "first pose moved along rigidly", "paper"];
         let mut table = Table::new("", "", 1, columns);
         let row = |name: &str, [own, local, kept]: [Cell; 3], paper: &str| {
             vec![Cell::text(name), own, local, kept, Cell::text(paper)]

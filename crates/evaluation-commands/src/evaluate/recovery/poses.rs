@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 use body::BodyModel;
 use clap::ValueEnum;
 use evaluation::training_poses::{covering, recorded_poses, training_poses};
+use model::counted;
 use motion_db::Clip;
 use sample_motion::{Action, DrawOptions, Model};
 
@@ -61,7 +62,7 @@ pub fn read(
     };
     let (drawn_of, drawn) = in_part(if part == Part::Report { 0 } else { 1 });
     let (prior_of, prior) = in_part(2);
-    eprintln!("bringing {} recordings to the body", drawn.len() + prior.len());
+    eprintln!("bringing {} to the body", counted(drawn.len() + prior.len(), "recording"));
     let [drawn, prior] = [drawn, prior].map(|clips| poses(model, &clips));
     Ok(Poses {
         drawn: chosen(&drawn?, starts)?,
@@ -101,7 +102,7 @@ fn synthetic(model: &BodyModel, part: Part, starts: usize, seed: u64) -> anyhow:
 /// The poses that stand for all others best, as many as there are starts.
 fn chosen(poses: &[Vec<f64>], starts: usize) -> anyhow::Result<Vec<Vec<f64>>> {
     if poses.len() < starts {
-        bail!("the recordings have {} poses, expected at least --starts, {starts}", poses.len());
+        bail!("the recordings have {}, expected at least --starts, {starts}", counted(poses.len(), "pose"));
     }
     Ok(covering(poses, starts).into_iter().map(|index| poses[index].clone()).collect())
 }

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use body::{Aligned, LearnOptions, ScanOptions, ScanSet};
 use evaluation::{Body, Distribution, ShapeErrors, shape_errors};
 use formats::archive::Entry;
-use model::Mesh;
+use model::{Mesh, counted};
 use nalgebra::Vector3;
 use serde::Serialize;
 use shape_fit::{Options, fit};
@@ -87,7 +87,7 @@ pub fn run(folder: &Path, args: &Args) -> anyhow::Result<()> {
     set.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     let meshes = Meshes::read(folder)?;
     let scans = set.scans();
-    eprintln!("bringing {} scans to one pose", scans.len());
+    eprintln!("bringing {} to one pose", counted(scans.len(), "scan"));
     let options = LearnOptions::default();
     let aligned = Aligned::new(&scans, &set.template, &options)?;
     let people = people(&meshes.rows, args.leave_one_out)?;
