@@ -65,6 +65,6 @@ mod tests {
         let shown = |seconds: &[f64], frames| Latency::from_seconds(seconds.to_vec(), frames, 2).to_string();
         assert_eq!(shown(&[], 2), "2 frames, 0 poses, 2 dropped");
         let one = shown(&[0.001], 3);
-        assert!(one.starts_with("3 frames, 1 poses, 2 dropped; latency p50 1.00 ms, p95 1.00 ms"), "{one}");
+        assert!(one.starts_with("3 frames, 1 pose, 2 dropped; latency p50 1.00 ms, p95 1.00 ms"), "{one}");
     }
 }

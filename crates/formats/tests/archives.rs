@@ -234,7 +234,7 @@ fn a_broken_file_among_many_is_named_or_skipped() {
     let error = clips(&[entry("16.asf", "damaged"), entry("16_15.amc", AMC)]).unwrap_err().to_string();
     assert!(error.starts_with("16.asf: line 1: found \"damaged\""), "{error}");
     let error = clips(&[entry("readme.txt", "")]).unwrap_err().to_string();
-    assert!(error.contains("1 files, no motion among them"), "{error}");
+    assert!(error.contains("1 file, no motion among them"), "{error}");
 }
 
 #[test]

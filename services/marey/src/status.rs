@@ -133,4 +133,19 @@ mod tests {
         assert_eq!(run("running", ""), "running, 40 %");
         assert_eq!(run("succeeded", ""), "succeeded");
     }
+
+    #[test]
+    fn a_run_that_has_ended_is_not_said_to_be_cancelled() {
+        let cancelled = |before: &str, state: &str| {
+            let run = json!({
+                "id": "1", "kind": "multi-view", "state": state, "progress": 0.4, "phrase": "", "error": null,
+                "created_at": "2025-01-01T00:00:00Z",
+            });
+            super::cancelled(&serde_json::from_value::<Run>(run).unwrap(), before)
+        };
+        assert_eq!(cancelled("queued", "cancelled"), "run 1 is cancelled");
+        assert_eq!(cancelled("running", "running"), "run 1 is being cancelled");
+        assert_eq!(cancelled("failed", "failed"), "run 1 had already failed; nothing to cancel");
+        assert_eq!(cancelled("running", "succeeded"), "run 1 succeeded before it could be cancelled");
+    }
 }

@@ -206,6 +206,9 @@ fn one_camera_is_enough_and_none_too() -> Result<()> {
     let run =
         api.start_run(&session, &json!({ "inverse_kinematics": { "stature_m": 1.0, "mass_kg": 250 } }))?;
     let end = api.wait(&run)?;
-    ensure!(end["state"] == "failed" && end["error"].to_string().contains("such a body"), "{end}");
+    ensure!(
+        end["state"] == "failed" && end["error"].to_string().contains("those measurements are too unusual"),
+        "{end}"
+    );
     Ok(())
 }

@@ -95,7 +95,7 @@ impl Summary {
             "DONE in {:.0} s: {} reconstructed from 4 and from 6 of their points, each by two methods,\n\
              and a person followed in front of {} cameras: {sessions} sessions, {runs} runs.\n",
             took.as_secs_f64(),
-            counted(self.num_trials() as u64, kind),
+            counted(self.num_trials(), kind),
             cameras::CAPTURE.cameras,
         )
     }
