@@ -55,7 +55,7 @@ pub(crate) fn check_versioned_name(what: &str, name: &str) -> Result<()> {
         )));
     }
     if Uuid::parse_str(name).is_ok() {
-        return Err(Error::Unprocessable(format!("{name:?} is an id, which can't be the name of a {what}")));
+        return Err(Error::Unprocessable(format!("{name:?} is not a valid {what} name: it is an id")));
     }
     Ok(())
 }

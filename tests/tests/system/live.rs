@@ -277,7 +277,7 @@ fn nonsense_is_answered_with_an_error_that_names_the_frame() -> Result<()> {
 fn a_start_that_makes_no_sense_is_refused() -> Result<()> {
     let api = crate::with_database();
     let cases = [
-        (json!({ "points": ["left_wrist"] }), "found 1 control points"),
+        (json!({ "points": ["left_wrist"] }), "only 1 control point; 2 to 16 are needed"),
         (json!({ "points": ["left_wrist", "tail"] }), "tail"),
         (json!({ "parameters": { "neighbours": 1 } }), "neighbours is 1"),
         (json!({ "parameters": { "colour": 1 } }), "colour"),
