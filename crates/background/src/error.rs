@@ -5,7 +5,7 @@ use model::{counted, shown};
 #[non_exhaustive]
 pub enum Error {
     /// A parameter out of its range.
-    #[error("parameter {name} is {}, expected {low} to {high}", shown(*found))]
+    #[error("{name} is {}, expected {low} to {high}", shown(*found))]
     Parameter {
         /// its name
         name: &'static str,

@@ -143,7 +143,8 @@ impl FileRole {
             return Err(NotInSession::Elsewhere { role, made });
         }
         let Some(role) = stated else {
-            if let Some((_, made)) = LISTS.into_iter().find(|(list, _)| name.eq_ignore_ascii_case(list)) {
+            let plain = without_compression(name);
+            if let Some((_, made)) = LISTS.into_iter().find(|(list, _)| plain.eq_ignore_ascii_case(list)) {
                 return Err(NotInSession::List { name: name.to_owned(), made });
             }
             let guessed = Self::from_session_file(name);
@@ -365,7 +366,9 @@ mod tests {
         assert_eq!(skeleton, "a skeleton must be .asf or .bvh, found \"points.csv\"");
         let motion = refused("walk.bvh", Some(FileRole::Motion));
         assert_eq!(motion, "role motion belongs to motion databases, not to sessions");
-        assert!(refused("index.csv", None).contains("goes with files for motion databases"));
+        for list in ["index.csv", "Index.CSV.zst"] {
+            assert!(refused(list, None).contains("goes with files for motion databases"));
+        }
         let points = Some(FileRole::ControlPoints);
         assert_eq!(FileRole::in_session("index.csv", points), Ok(FileRole::ControlPoints));
         assert_eq!(FileRole::in_session("walk.bvh", None), Ok(FileRole::GroundTruth));

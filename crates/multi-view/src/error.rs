@@ -44,7 +44,12 @@ pub enum Error {
         expected: &'static str,
     },
     /// An invalid parameter of the background model.
-    #[error("background: {0}")]
+    #[error(
+        "background{mark}{error}",
+        // what begins with a parameter's name goes on the way to it
+        mark = if matches!(.0, background::Error::Parameter { .. }) { "." } else { ": " },
+        error = .0
+    )]
     Background(#[from] background::Error),
     /// A clip of silhouettes that is damaged or truncated.
     #[error("not a clip of silhouettes: {0}")]

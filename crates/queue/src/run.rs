@@ -13,7 +13,7 @@ use crate::{Error, ProjectId, RunId, RunState};
 pub struct NewRun<'a> {
     /// The project that it belongs to and whose share of the slots it uses.
     pub project_id: ProjectId,
-    /// What it does: `reconstruction`, `motion-database`.
+    /// What it does: `sparse`, `motion-database`.
     pub kind: &'a str,
     /// The capture session that it reads, if any.
     pub session_id: Option<Uuid>,

@@ -23,7 +23,7 @@ pub enum Error {
         found: String,
     },
     /// Too few or too many control points.
-    #[error("{}{}; 2 to {max} are needed", if *found < 2 { "only " } else { "" }, counted(found, "control point"))]
+    #[error("{}{}; 2 to {max} are needed", if *found == 1 { "only " } else { "" }, counted(found, "control point"))]
     PointCount {
         /// number found
         found: usize,

@@ -84,8 +84,9 @@ impl fmt::Display for FarSamples {
         let Self { count, measured, point, frame, .. } = self;
         write!(
             f,
-            "{count} of {measured} measured samples are more than 100 km from the origin and are ignored; the \
-             first: {point} in frame {frame}"
+            "{count} of {measured} measured samples {} more than 100 km from the origin and are ignored; the \
+             first: {point} in frame {frame}",
+            if *count == 1 { "is" } else { "are" }
         )
     }
 }

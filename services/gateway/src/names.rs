@@ -24,7 +24,10 @@ pub(crate) fn check_line(field: &str, text: &str) -> Result<()> {
 }
 
 /// Checks the name of a file: one path component, nothing hidden.
-pub(crate) fn check_file_name(name: &str) -> Result<()> {
+///
+/// # Errors
+/// [`Error::Unprocessable`] says what is wrong with it.
+pub fn check_file_name(name: &str) -> Result<()> {
     let length = name.chars().count();
     if let Some(c) = name.chars().find(|c| c.is_control()) {
         return Err(Error::Unprocessable(format!(

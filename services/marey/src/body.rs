@@ -254,7 +254,9 @@ fn learn_here(args: &LearnArgs, out: &Path) -> anyhow::Result<()> {
         set.learn(&LearnOptions { components: args.components, description, ..LearnOptions::default() })?;
     let bytes = learned.model.to_bytes();
     fs::write(out, &bytes).with_context(|| out.display().to_string())?;
-    println!("{} components keep {}", learned.model.num_components(), kept(&learned.variance_kept));
+    let components = learned.model.num_components();
+    let keep = if components == 1 { "keeps" } else { "keep" };
+    println!("{} {keep} {}", counted(components, "component"), kept(&learned.variance_kept));
     println!("{} bytes  {}", bytes.len(), out.display());
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use formats::{
     archive::without_compression,
     motion_files::{FileUse, is_motion_file},
@@ -38,6 +38,10 @@ pub fn pack(name: &str, paths: &[PathBuf]) -> anyhow::Result<Vec<Upload>> {
             collect(path, path, &mut loose)?;
         } else if has_extension(&file_name, &ARCHIVES) {
             let file = open(path)?;
+            ensure!(
+                uploads.iter().all(|upload: &Upload| upload.name != file_name),
+                "two archives are called {file_name}; one would replace the other, so rename one"
+            );
             uploads.push(Upload { name: file_name, file, num_files: 0 });
         } else if is_motion_file(&file_name) {
             single.push(path.clone());
@@ -201,8 +205,17 @@ fn listed(paths: &[PathBuf]) -> String {
     paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
-fn open(path: &Path) -> anyhow::Result<File> {
-    File::open(path).with_context(|| path.display().to_string())
+/// Opens a file that is to be uploaded.
+///
+/// # Errors
+/// If it can't be read, is empty, or is a pipe or device, which has no end that could be told.
+pub fn open(path: &Path) -> anyhow::Result<File> {
+    let named = || path.display().to_string();
+    // before it is opened: that of a pipe waits for a writer
+    let metadata = fs::metadata(path).with_context(named)?;
+    ensure!(metadata.is_file(), "{} is not a file", path.display());
+    ensure!(metadata.len() > 0, "{} is empty", path.display());
+    File::open(path).with_context(named)
 }
 
 #[cfg(test)]

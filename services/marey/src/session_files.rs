@@ -40,7 +40,7 @@ pub fn gather(paths: &[PathBuf]) -> anyhow::Result<Vec<SessionFile>> {
         let is_plate = path.parent().is_some_and(|folder| role_of(folder) == FileRole::Plate)
             && FileRole::is_picture_file(&own);
         let (name, role) = if is_plate { (plate_name(&own), Some(FileRole::Plate)) } else { (own, None) };
-        found.push(SessionFile { path: path.clone(), name, role, file: open(path)? });
+        found.push(SessionFile { path: path.clone(), name, role, file: pack::open(path)? });
     }
     check_names(&found)?;
     Ok(found)
@@ -78,7 +78,7 @@ fn from_folder(folder: &Path) -> anyhow::Result<Vec<SessionFile>> {
                     path: path.clone(),
                     name: plate_name(&own),
                     role: Some(role),
-                    file: open(path)?,
+                    file: pack::open(path)?,
                 })
             })
             .collect();
@@ -101,10 +101,6 @@ fn plate_name(name: &str) -> String {
 
 fn role_of(folder: &Path) -> FileRole {
     FileRole::from_folder(&folder.file_name().map(|n| n.to_string_lossy()).unwrap_or_default())
-}
-
-fn open(path: &Path) -> anyhow::Result<File> {
-    File::open(path).with_context(|| path.display().to_string())
 }
 
 #[cfg(test)]

@@ -61,9 +61,8 @@ fn cancelled(run: &Run, before: &str) -> String {
     match (before, state.as_str()) {
         ("failed" | "succeeded", ended) => format!("run {id} had already {ended}; nothing to cancel"),
         ("cancelled", _) => format!("run {id} was already cancelled; nothing to cancel"),
-        (_, "cancelled") => format!("run {id} is cancelled"),
         (_, ended @ ("failed" | "succeeded")) => format!("run {id} {ended} before it could be cancelled"),
-        _ => format!("run {id} is being cancelled"),
+        (_, state) => format!("run {id} is {state}"),
     }
 }
 
@@ -104,7 +103,7 @@ fn state(run: &Run) -> String {
 fn show(run: &Run) {
     println!("run      {}", run.id);
     println!("run of   {}: {}", run.kind, subject(run));
-    println!("started  {}", run.created_at);
+    println!("created  {}", run.created_at);
     println!("state    {}", state(run));
     if let Some(error) = &run.error {
         println!("error    {error}");
@@ -144,7 +143,6 @@ mod tests {
             super::cancelled(&serde_json::from_value::<Run>(run).unwrap(), before)
         };
         assert_eq!(cancelled("queued", "cancelled"), "run 1 is cancelled");
-        assert_eq!(cancelled("running", "running"), "run 1 is being cancelled");
         assert_eq!(cancelled("failed", "failed"), "run 1 had already failed; nothing to cancel");
         assert_eq!(cancelled("running", "succeeded"), "run 1 succeeded before it could be cancelled");
     }

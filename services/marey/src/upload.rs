@@ -80,6 +80,7 @@ fn with_roles(files: Vec<SessionFile>, args: &Args) -> anyhow::Result<Vec<(Strin
     let named = files.into_iter().map(|found| {
         let name = args.name.clone().unwrap_or(found.name);
         let role = args.role.or(found.role);
+        gateway::check_file_name(&name)?;
         FileRole::in_session(&name, role)?;
         Ok((name, role, found.file))
     });
@@ -145,9 +146,15 @@ mod tests {
         let points = path("points.csv");
         assert_eq!(check(&[&points]).unwrap(), 1);
         let (log, index) = (path("up.log"), path("index.csv"));
+        let (hidden, empty) = (path(".hidden.csv"), path("empty.csv"));
+        fs::write(&hidden, "x").unwrap();
+        fs::write(&empty, "").unwrap();
+        let is_empty = format!("{empty} is empty");
         for (words, expected) in [
             (&[points.as_str(), &log][..], "the type of \"up.log\" is not known"),
             (&[&points, &index], "\"index.csv\" is the list that goes with files for motion databases"),
+            (&[&points, &hidden], "\".hidden.csv\" is not a valid file name"),
+            (&[&points, &empty], &is_empty),
             (&[&points, "--role", "motion"], "role motion belongs to motion databases"),
             (&[&points, "--role", "skeleton"], "a skeleton must be .asf or .bvh, found \"points.csv\""),
         ] {

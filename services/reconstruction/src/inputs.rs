@@ -200,7 +200,7 @@ mod tests {
         assert_eq!(read_with("0", false).unwrap().warnings, [""; 0]);
         let warnings = read_with("500000", false).unwrap().warnings;
         assert!(
-            warnings[0].starts_with("walk.csv: 1 of 8 measured samples are more than 100 km from the origin")
+            warnings[0].starts_with("walk.csv: 1 of 8 measured samples is more than 100 km from the origin")
                 && warnings[0].ends_with("the first: head in frame 2"),
             "{warnings:?}"
         );

@@ -64,7 +64,7 @@ impl Handler for BuildHandler {
                 "{}@{}, learned from {}",
                 request.body_model.name,
                 request.body_model.version,
-                set.num_scans()
+                counted(set.num_scans(), "scan")
             ),
             ..LearnOptions::default()
         };

@@ -5,7 +5,7 @@ mod source;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 use anyhow::{Context, Result, ensure};
@@ -68,7 +68,7 @@ fn module(folder: &Path, file: &Path) -> Result<Option<Module>> {
     }
     let mut module: Module =
         inside.with_extension("").iter().map(|part| part.to_string_lossy().into_owned()).collect();
-    let is_its_folders = module.last().is_some_and(|last| last == "mod") || inside == PathBuf::from("lib.rs");
+    let is_its_folders = module.last().is_some_and(|last| last == "mod") || inside == Path::new("lib.rs");
     if is_its_folders {
         module.pop();
     }

@@ -118,7 +118,7 @@ impl<'s> Reader<'s> {
     }
 
     /// A path from the crate's root; none for what is of another crate, or is named without a module.
-    fn from_root(&self, path: &[String]) -> Option<Module> {
+    fn path_from_root(&self, path: &[String]) -> Option<Module> {
         let mut at = self.module.clone();
         let mut rest = path;
         match path.first()?.as_str() {
@@ -162,7 +162,7 @@ impl<'s> Reader<'s> {
             UseTree::Glob(_) => (None, String::new()),
         };
         let path: Vec<String> = before.iter().cloned().chain(name.filter(|name| name != "self")).collect();
-        let Some(path) = self.from_root(&path) else { return };
+        let Some(path) = self.path_from_root(&path) else { return };
         if is_re_export {
             self.names.re_exports.insert(exported, path);
         } else {
@@ -189,7 +189,7 @@ impl<'ast> Visit<'ast> for Reader<'_> {
 
     fn visit_path(&mut self, path: &'ast syn::Path) {
         let names: Vec<String> = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
-        match self.from_root(&names) {
+        match self.path_from_root(&names) {
             Some(path) => drop(self.names.used.insert(path)),
             None => self.relative.push(names),
         }

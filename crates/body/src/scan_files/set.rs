@@ -136,7 +136,10 @@ fn check_size(scans: &[RawScan]) -> Result<()> {
     let vertices: usize = scans.iter().map(|scan| scan.vertices.len()).sum();
     if scans.len() < 2 || scans.len() > MAX_SCANS || vertices > MAX_VERTICES {
         return Err(Error::ScanSet {
-            found: format!("{} scans in the base pose, of {vertices} vertices together", scans.len()),
+            found: format!(
+                "{} in the base pose, of {vertices} vertices together",
+                counted(scans.len(), "scan")
+            ),
             expected: format!("2 to {MAX_SCANS} of at most {MAX_VERTICES}"),
         });
     }

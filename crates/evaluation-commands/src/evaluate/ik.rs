@@ -283,7 +283,10 @@ fn print(json: &Json) {
     println!();
     for Speed { views, steps, solves_per_second } in &json.speed {
         let paper = if *views == 2 { " (paper: 19)" } else { "" };
-        println!("{views} views: {solves_per_second:.0} solves a second of {steps} steps, one thread{paper}");
+        println!(
+            "{}: {solves_per_second:.0} solves a second of {steps} steps, one thread{paper}",
+            counted(views, "view")
+        );
     }
     for Trials { action, names, frames } in &json.trials {
         println!("{action}: {} of {}", counted(frames, "frame"), names.join(" "));

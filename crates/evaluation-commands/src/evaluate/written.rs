@@ -92,7 +92,10 @@ impl Outcome<'_> {
             println!("the defaults were tuned on others: {}", self.tuning.join(" "));
         }
         if evaluation.threads > 1 {
-            println!("{} trials ran at once; with --threads 1, frames/s are higher", evaluation.threads);
+            println!(
+                "{} at once; with --threads 1, frames/s are higher",
+                counted(evaluation.threads, "trial")
+            );
         }
     }
 

@@ -81,7 +81,10 @@ impl CameraFields {
 
     /// The first field that is given, if any is.
     pub fn first_given(&self) -> Result<Option<String>> {
-        let (given, default) = (serde_json::to_value(self)?, serde_json::to_value(Self::default())?);
+        let (mut given, default) = (serde_json::to_value(self)?, serde_json::to_value(Self::default())?);
+        if let Some(parameters) = given["parameters"].as_object_mut() {
+            parameters.retain(|_, value| !value.is_null());
+        }
         let mut fields = given.as_object().into_iter().flatten();
         Ok(fields.find(|(name, value)| default[*name] != **value).map(|(name, _)| name.clone()))
     }
@@ -91,7 +94,7 @@ impl CameraFields {
         let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters.{error}"));
         let mut parameters: Parameters = json::read_parameters(self.parameters.clone())?;
         if let Some(kind) = &self.background {
-            if self.parameters.get("background").is_some_and(|given| given.get("model").is_some()) {
+            if self.parameters.get("background").is_some_and(|given| !given["model"].is_null()) {
                 let what = "background is given twice: as a field and in parameters";
                 return Err(Error::Unprocessable(what.into()));
             }

@@ -124,7 +124,7 @@ fn read(kind: &Kind, because: &str, mut fields: Map<String, Value>) -> Result<Bo
         )));
     }
     fields.retain(|_, value| !value.is_null());
-    kind.read(fields)
+    kind.read(fields).map_err(|error| error.because(because))
 }
 
 /// Names of kinds, as a sentence has them.
