@@ -1,7 +1,7 @@
 //! File formats of motion, markers, cameras, meshes and pictures: bytes to model and back.
 //!
 //! Readers take bytes and give a [`Read`]: the value, in metres, seconds and radians with y up, and the warnings about
-//! what was sloppy in the file (only the value, where nothing can be). What can't be read is an [`Error`] that says
+//! what was doubtful in the file (only the value, where nothing can be). What can't be read is an [`Error`] that says
 //! where (line or byte offset), what was found and what was expected. Readers never panic and need memory in
 //! proportion to the bytes they are given, whatever the bytes claim; pictures, which are packed, have limits of their
 //! own. The dialects are described in `docs/formats.md`.

@@ -7,7 +7,7 @@ use crate::Place;
 /// Warnings kept per file; the rest are only counted, so that a hostile file can't fill memory with them.
 const KEPT: usize = 50;
 
-/// What was read, and what was sloppy about the file.
+/// What was read, and what was doubtful about the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Read<T> {
     /// the value

@@ -94,9 +94,9 @@ fn hierarchy_channels_units_and_rate_are_read() {
 }
 
 #[test]
-fn sloppy_files_are_read_as_the_plain_one() {
+fn untidy_files_are_read_as_the_plain_one() {
     let plain = read(PLAIN);
-    let sloppy = [
+    let untidy = [
         PLAIN.replace('\n', "\r\n"),
         PLAIN.replace("  ", "\t"),
         PLAIN.replace("\n{", " {"),
@@ -104,7 +104,7 @@ fn sloppy_files_are_read_as_the_plain_one() {
         PLAIN.replace("ROOT", "Root").replace("MOTION\n", "MOTION\n\n").replace("Xrotation", "XROTATION"),
         PLAIN.replace("40 50 60 7\n", "40 50 60 7 \n\n"),
     ];
-    for text in sloppy {
+    for text in untidy {
         assert_eq!(read(&text), plain, "{text}");
     }
 }

@@ -91,7 +91,7 @@ impl Request for SolveInverseKinematics {
     }
 
     fn subject(&self) -> Subject<'_> {
-        self.inputs.subject(Some(&self.how.choice))
+        self.inputs.subject()
     }
 
     fn learned_from(&self) -> LearnedFrom<'_> {
@@ -104,13 +104,29 @@ impl Request for SolveInverseKinematics {
             "up": self.inputs.up,
             "points": self.how.choice,
             "cameras": cameras.map(|planned| &planned.choice),
-            "silhouettes": cameras.and_then(|planned| planned.parameters.as_ref()),
         })
     }
 
     fn parameters(&self) -> serde_json::Result<Value> {
-        serde_json::to_value(&self.how)
+        let InverseKinematics { solver, steps, frame_rate, body, choice: _ } = &self.how;
+        let silhouettes = self.cameras.as_ref().and_then(|planned| planned.parameters.as_ref());
+        Ok(json!({
+            "solver": solver,
+            "steps": steps,
+            "frame_rate": frame_rate,
+            "body": body,
+            "silhouettes": silhouettes.map(silhouette_parameters).transpose()?,
+        }))
     }
+}
+
+/// The parameters of a camera run that decide its silhouettes.
+fn silhouette_parameters(parameters: &multi_view::Parameters) -> serde_json::Result<Value> {
+    let mut parameters = serde_json::to_value(parameters)?;
+    if let Some(fields) = parameters.as_object_mut() {
+        fields.retain(|name, _| multi_view::Parameters::OF_SILHOUETTES.contains(&name.as_str()));
+    }
+    Ok(parameters)
 }
 
 /// What the plan of the cameras hands on.
@@ -124,7 +140,7 @@ pub struct CamerasPlanned {
     /// How their silhouettes were made.
     #[serde(default)]
     pub parameters: Option<multi_view::Parameters>,
-    /// What was sloppy about the files.
+    /// What was doubtful about the files.
     pub warnings: Vec<String>,
     /// What the plan itself took.
     pub plan: JobReport,
@@ -145,7 +161,17 @@ mod tests {
         let reading = request.reading();
         assert_eq!(reading["points"]["points"], json!(["head"]));
         assert_eq!(reading["points"]["marker_set"], "none");
-        assert_eq!(request.parameters().unwrap()["points"], json!(["head"]));
+        let parameters = request.parameters().unwrap();
+        assert_eq!(parameters["solver"], "plain");
+        assert_eq!(parameters["points"], Value::Null, "said once, with how the files are read");
+    }
+
+    #[test]
+    fn parameters_of_silhouettes_are_those_that_decide_them() {
+        let shown = silhouette_parameters(&multi_view::Parameters::default()).unwrap();
+        let names: std::collections::BTreeSet<&str> =
+            shown.as_object().unwrap().keys().map(String::as_str).collect();
+        assert_eq!(names, multi_view::Parameters::OF_SILHOUETTES.into());
     }
 
     #[test]

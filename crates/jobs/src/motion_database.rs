@@ -111,7 +111,7 @@ impl Job for ImportMotion {
 pub struct PartReport {
     /// The clips, in the order of the part.
     pub clips: Vec<PartClip>,
-    /// What was sloppy, each with the file's name.
+    /// What was doubtful, each with the file's name.
     pub warnings: Vec<String>,
     /// What it took.
     pub job: JobReport,

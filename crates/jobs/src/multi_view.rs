@@ -56,7 +56,7 @@ impl Request for PlanMultiView {
     }
 
     fn subject(&self) -> Subject<'_> {
-        self.inputs.subject(None)
+        self.inputs.subject()
     }
 
     fn learned_from(&self) -> LearnedFrom<'_> {

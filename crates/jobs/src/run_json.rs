@@ -3,7 +3,7 @@
 
 mod timings;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use formats::FileRole;
 use queue::JobError;
@@ -32,14 +32,14 @@ pub trait Request {
     /// What was learned before and is used.
     fn learned_from(&self) -> LearnedFrom<'_>;
 
-    /// Parameters, all resolved.
+    /// Parameters of the method, all resolved.
     ///
     /// # Errors
     /// If they are no JSON.
     fn parameters(&self) -> serde_json::Result<Value>;
 
-    /// How the files were read, as far as a request may say: what is not among the parameters of the method; null where nothing
-    /// may be said.
+    /// How the files were read, as far as a request may say: which points or cameras, axes and units. Null where nothing may be
+    /// said.
     fn reading(&self) -> Value {
         Value::Null
     }
@@ -71,9 +71,6 @@ pub struct SessionReport<'a> {
     pub name: &'a str,
     /// its files
     pub files: Vec<FileReport<'a>>,
-    /// name in the file → name of a control point or joint
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mapping: Option<&'a BTreeMap<String, String>>,
     /// how its files were read
     #[serde(skip_serializing_if = "Value::is_null")]
     pub reading: Value,

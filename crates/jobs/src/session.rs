@@ -26,12 +26,11 @@ pub struct SessionInputs {
 
 impl SessionInputs {
     /// The session as `run.json` names it.
-    pub(crate) fn subject<'a>(&'a self, choice: Option<&'a PointChoice>) -> Subject<'a> {
+    pub(crate) fn subject(&self) -> Subject<'_> {
         Subject::Session(SessionReport {
             id: self.session_id,
             name: &self.session_name,
             files: FileReport::all(&self.files),
-            mapping: choice.map(|choice| &choice.mapping),
             ..SessionReport::default()
         })
     }

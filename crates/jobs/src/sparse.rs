@@ -58,7 +58,7 @@ impl Request for PlanSparse {
     }
 
     fn subject(&self) -> Subject<'_> {
-        self.inputs.subject(Some(&self.choice))
+        self.inputs.subject()
     }
 
     fn learned_from(&self) -> LearnedFrom<'_> {
@@ -108,7 +108,7 @@ pub struct MergeChunks {
     pub session: Object,
     /// The control points that are used.
     pub points: Vec<String>,
-    /// What was sloppy about the files.
+    /// What was doubtful about the files.
     pub warnings: Vec<String>,
     /// The skeleton that was fitted, if the session came without one.
     #[serde(default)]

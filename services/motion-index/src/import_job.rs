@@ -81,8 +81,8 @@ fn import(
     for (file, motion) in motions.into_iter().enumerate() {
         context.check()?;
         context.progress(file as f64 / num_files as f64, format!("reading {}", motion.name));
-        let (clip, sloppy) = reader.clip(motion)?;
-        warnings.extend(sloppy);
+        let (clip, doubts) = reader.clip(motion)?;
+        warnings.extend(doubts);
         let Some(clip) = clip else { continue };
         for clip in augment.clips(&clip).map_err(|e| no_database(&e))? {
             let num_poses = part.append(&clip).map_err(|e| no_database(&e))?;

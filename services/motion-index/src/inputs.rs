@@ -73,7 +73,7 @@ impl Reader {
         Self { entries: support, options: motion_files::Options { bvh, ..motion_files::Options::default() } }
     }
 
-    /// The clip of a motion file, and what was sloppy about it.
+    /// The clip of a motion file, and what was doubtful about it.
     ///
     /// # Errors
     /// Gives up on what can't be read, with the file and the place in it.

@@ -55,7 +55,7 @@ pub(crate) struct Selection<'a> {
 pub(crate) struct Evidence {
     /// Skeleton, points and trajectories at 60 frames a second.
     pub session: Session,
-    /// What was sloppy, each with the file's name.
+    /// What was doubtful, each with the file's name.
     pub warnings: Vec<String>,
     /// Whether a file had the skeleton; otherwise it is the fallback.
     pub has_skeleton: bool,

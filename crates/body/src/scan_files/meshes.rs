@@ -18,7 +18,7 @@ pub(crate) struct RawScan {
     pub faces: Option<Vec<[u32; 3]>>,
 }
 
-/// Reads a mesh from OBJ or PLY; what was sloppy goes to `warnings`.
+/// Reads a mesh from OBJ or PLY; what was doubtful goes to `warnings`.
 pub(crate) fn mesh(entry: &Entry, warnings: &mut Vec<String>) -> Result<model::Mesh> {
     let is_obj = entry.name.to_ascii_lowercase().ends_with(".obj");
     let read = if is_obj { formats::obj::read(&entry.bytes) } else { formats::ply::read(&entry.bytes) };
