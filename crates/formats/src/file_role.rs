@@ -196,7 +196,7 @@ impl FileRole {
     }
 
     /// The roles that files of sessions have.
-    pub fn of_sessions() -> impl Iterator<Item = Self> {
+    pub fn session_roles() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|role| role.elsewhere().is_none())
     }
 
@@ -211,7 +211,7 @@ impl FileRole {
 
     /// The endings of all files that a session can have, by role: `skeleton .asf or .bvh; …`.
     pub fn session_endings() -> String {
-        Self::of_sessions().map(|role| format!("{role} {}", role.endings())).collect::<Vec<_>>().join("; ")
+        Self::session_roles().map(|role| format!("{role} {}", role.endings())).collect::<Vec<_>>().join("; ")
     }
 
     /// Whether a file of that name is a picture, not compressed once more.
@@ -282,12 +282,16 @@ pub enum NotInSession {
     },
 }
 
-/// A word that is no role.
+/// A word that is no role. The message names those that files of sessions can have, as people state no others.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("found role {found:?}, expected one of {}", FileRole::of_sessions().map(FileRole::as_str).collect::<Vec<_>>().join(", "))]
+#[error("found {found:?}, expected one of {}", session_words())]
 pub struct UnknownFileRole {
     /// The word.
     pub found: String,
+}
+
+fn session_words() -> String {
+    FileRole::session_roles().map(FileRole::as_str).collect::<Vec<_>>().join(", ")
 }
 
 impl FromStr for FileRole {

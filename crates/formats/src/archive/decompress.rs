@@ -1,7 +1,8 @@
+use std::error::Error;
 use std::io::{self, Read};
 
 use flate2::bufread::MultiGzDecoder;
-use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
+use ruzstd::decoding::{FrameDecoder, StreamingDecoder, errors::FrameDecoderError};
 
 /// Compression of a single stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,18 +64,38 @@ impl ZstdFrames<'_> {
         if self.rest.is_empty() {
             return Ok(false);
         }
-        self.frame = Some(StreamingDecoder::new(self.rest).map_err(|e| damage(&e))?);
+        self.frame = Some(StreamingDecoder::new(self.rest).map_err(|e| reason(&e))?);
         Ok(true)
     }
 }
 
-/// What the decoder found, which it tells in words of its own code.
-fn damage(error: &impl std::fmt::Debug) -> io::Error {
-    if format!("{error:?}").contains("UnexpectedEof") {
-        io::Error::new(io::ErrorKind::UnexpectedEof, "it ends in the middle of its data")
-    } else {
-        io::Error::new(io::ErrorKind::InvalidData, "its data is damaged")
+/// Why the decoder stopped, which it tells in words of its own code.
+fn reason(error: &(dyn Error + 'static)) -> io::Error {
+    let mut next = Some(error);
+    while let Some(error) = next {
+        let io_error = error.downcast_ref::<io::Error>();
+        if io_error.is_some_and(|error| error.kind() == io::ErrorKind::UnexpectedEof) {
+            return io::Error::new(io::ErrorKind::UnexpectedEof, "it ends in the middle of its data");
+        }
+        match error.downcast_ref::<FrameDecoderError>() {
+            Some(FrameDecoderError::WindowSizeTooBig { requested, max }) => {
+                return io::Error::other(format!(
+                    "it needs a window of {requested} bytes to unpack, expected at most {max}; compress it without --long or \
+                     --ultra"
+                ));
+            }
+            Some(FrameDecoderError::DictNotProvided { .. }) => {
+                return io::Error::other("it was compressed with a dictionary; compress it without one");
+            }
+            _ => {}
+        }
+        // what an `io::Error` holds is not among its sources
+        next = match io_error {
+            Some(io_error) => io_error.get_ref().map(|inner| inner as &(dyn Error + 'static)),
+            None => error.source(),
+        };
     }
+    io::Error::new(io::ErrorKind::InvalidData, "its data is damaged")
 }
 
 impl Read for ZstdFrames<'_> {
@@ -89,7 +110,7 @@ impl Read for ZstdFrames<'_> {
                 }
                 continue;
             };
-            let read = frame.read(buffer).map_err(|e| damage(&e))?;
+            let read = frame.read(buffer).map_err(|e| reason(&e))?;
             if read > 0 {
                 return Ok(read);
             }
@@ -129,7 +150,22 @@ mod tests {
     fn truncated_streams_are_errors() {
         let packed = zstd(&b"some text that is long enough ".repeat(20));
         for length in 4..packed.len() {
-            assert!(unpack(&packed[..length]).is_err(), "{length} of {}", packed.len());
+            let error = unpack(&packed[..length]).unwrap_err();
+            assert_eq!(error.kind(), io::ErrorKind::UnexpectedEof, "{length} of {}: {error}", packed.len());
         }
+    }
+
+    #[test]
+    fn a_stream_that_is_not_unpacked_says_why() {
+        let mut damaged = zstd(&b"some text that is long enough ".repeat(20));
+        let blocks = damaged.len() - 12;
+        damaged[blocks..].fill(0xff);
+        assert_eq!(unpack(&damaged).unwrap_err().to_string(), "its data is damaged");
+        // a frame's header: no dictionary and a window of 2 GiB; dictionary 7 and a window of 1 KiB
+        let frame = |header: &[u8]| [&[0x28, 0xb5, 0x2f, 0xfd], header, &[1, 0, 0]].concat();
+        let error = unpack(&frame(&[0x00, 21 << 3])).unwrap_err().to_string();
+        assert!(error.starts_with("it needs a window of 2147483648 bytes to unpack"), "{error}");
+        let error = unpack(&frame(&[0x01, 0, 7])).unwrap_err().to_string();
+        assert!(error.starts_with("it was compressed with a dictionary"), "{error}");
     }
 }
