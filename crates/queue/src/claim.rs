@@ -27,9 +27,9 @@ pub async fn claim(
     if jobs.is_empty() {
         return Ok(jobs);
     }
-    let first_attempts: BTreeSet<RunId> = jobs.iter().map(|job| job.run_id).collect();
+    let runs: BTreeSet<RunId> = jobs.iter().map(|job| job.run_id).collect();
     let started: Result<Vec<String>, _> = sqlx::query_scalar(include_str!("../queries/start_runs.sql"))
-        .bind(first_attempts.into_iter().collect::<Vec<_>>())
+        .bind(runs.into_iter().collect::<Vec<_>>())
         .fetch_all(&mut *connection)
         .await;
     // The jobs are ours already and must not be dropped: the run's state comes with the next progress.

@@ -16,7 +16,8 @@ pub const DEFAULT_MAX_ATTEMPTS: i32 = 3;
 pub trait Job: Serialize + DeserializeOwned + Send + 'static {
     /// Which handler runs it.
     const KIND: &'static str;
-    /// Version of the payload, from 1.
+    /// Version of the payload, from 1. It holds for all that the payload is made of: where one payload holds another, such as a
+    /// merge the plan's, or names artefacts to be read, both go up together.
     const VERSION: i32 = 1;
     /// After so many failed attempts the job has failed for good; 1 to 1000.
     const MAX_ATTEMPTS: i32 = DEFAULT_MAX_ATTEMPTS;

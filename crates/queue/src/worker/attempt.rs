@@ -29,9 +29,13 @@ pub(super) async fn attempt(shared: Arc<Shared>, job: ClaimedJob) {
     async {
         let end = match shared.handlers.get(job.kind.as_str()) {
             // A claim that was on its way when the shutdown came.
-            _ if shared.shutdown.is_cancelled() => End::HandBack,
+            _ if shared.shutdown.is_cancelled() => Some(End::HandBack),
             Some(handler) => run(&shared, handler.clone(), &job, &held).await,
-            None => End::HandBack,
+            None => Some(End::HandBack),
+        };
+        let Some(end) = end else {
+            tracing::warn!("lease lost, result dropped");
+            return;
         };
         let settled = settle(&shared, &job, &lease, end).await;
         tracing::debug!(?settled, "job settled");
@@ -48,10 +52,15 @@ enum End {
     Panicked(String),
     AcknowledgeCancel,
     HandBack,
-    Drop,
 }
 
-async fn run(shared: &Shared, handler: Arc<dyn DynHandler>, job: &Arc<ClaimedJob>, held: &Arc<Held>) -> End {
+/// Runs the handler; nothing where the lease is lost, as then somebody else writes the end.
+async fn run(
+    shared: &Shared,
+    handler: Arc<dyn DynHandler>,
+    job: &Arc<ClaimedJob>,
+    held: &Arc<Held>,
+) -> Option<End> {
     let context = JobContext::new(job.clone(), held.clone());
     let before = shared.before_attempt.clone();
     // A task of its own: a panic ends the task, not the worker.
@@ -71,14 +80,14 @@ async fn run(shared: &Shared, handler: Arc<dyn DynHandler>, job: &Arc<ClaimedJob
     if result.is_none() {
         tracing::warn!(reason = ?held.stopped(), "handler did not stop when told to, left behind");
     }
-    match (result, held.stopped()) {
-        (_, Some(Stop::LeaseLost)) => End::Drop,
+    Some(match (result, held.stopped()) {
+        (_, Some(Stop::LeaseLost)) => return None,
         (Some(Ok(Ok(outcome))), _) => End::Complete(outcome),
         (_, Some(Stop::Cancelled)) => End::AcknowledgeCancel,
         (_, Some(Stop::Shutdown)) | (None, None) => End::HandBack,
         (Some(Ok(Err(error))), None) => End::Fail(error),
         (Some(Err(error)), None) => End::Panicked(panic_message(error)),
-    }
+    })
 }
 
 /// Writes the end until it is acknowledged: meanwhile the slot stays taken and the lease is kept.
@@ -120,10 +129,6 @@ async fn write(
     lease: &Lease,
     end: &End,
 ) -> Result<Option<Settled>, Error> {
-    if let End::Drop = end {
-        tracing::warn!("lease lost, result dropped");
-        return Ok(None);
-    }
     let mut connection = shared.pool.acquire().await?;
     let connection: &mut PgConnection = &mut connection;
     let retry = |detail: String| {
@@ -142,7 +147,7 @@ async fn write(
             return completing.await.map(Some);
         }
         End::AcknowledgeCancel => return acknowledge_cancel(connection, lease).await.map(Some),
-        End::HandBack | End::Drop => return hand_back(connection, lease).await.map(Some),
+        End::HandBack => return hand_back(connection, lease).await.map(Some),
         End::Fail(JobError::GiveUp { message, detail }) => {
             Failure::GiveUp { message: message.clone(), detail: detail.clone() }
         }

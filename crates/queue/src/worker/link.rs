@@ -36,7 +36,7 @@ impl Link {
         };
         let (connection, answer) = tokio::time::timeout(limit, work)
             .await
-            .map_err(|_| Error::Database(sqlx::Error::PoolTimedOut))??;
+            .map_err(|_| Error::Database(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into())))??;
         self.connection = Some(connection);
         Ok(answer)
     }

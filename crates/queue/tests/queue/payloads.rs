@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use queue::{ChildJob, Job, Outcome, RunState};
+use queue::{ChildJob, Job, NewRun, Outcome, RunState};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
@@ -111,4 +111,14 @@ async fn a_job_that_an_older_program_enqueues_by_a_former_name_gets_the_present_
     let former = ChildJob { kind: "initialise-body", ..job(Chunk, json!(null)) };
     let (_, ids) = queue.run(&[former]).await;
     assert_eq!(queue.job(ids[0], "kind").await, "fit-shape");
+}
+
+#[tokio::test]
+async fn a_run_that_an_older_program_adds_by_a_former_name_gets_the_present_one() {
+    let queue = Queue::new().await;
+    let former =
+        NewRun { project_id: queue.project, kind: "reconstruction", session_id: None, parameters: json!({}) };
+    let mut connection = queue.pool.acquire().await.unwrap();
+    let run_id = queue::enqueue_run(&mut connection, &former).await.unwrap();
+    assert_eq!(queue.status(run_id).await.kind, "sparse");
 }
