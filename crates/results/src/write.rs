@@ -2,7 +2,7 @@ use std::{ops::Range, path::Path};
 
 use queue::{Artefact, JobContext, JobError};
 use service::{compute, objects};
-use store::{Store, Stored, UploadLimits, key};
+use store::{Store, Stored, UploadLimits};
 use tokio::fs::File;
 use tokio_util::io::ReaderStream;
 
@@ -52,8 +52,7 @@ pub async fn write_one(store: &Store, context: &JobContext, file: ResultFile) ->
 
 /// Stores a file without holding it in memory.
 async fn upload(store: &Store, context: &JobContext, name: &str, path: &Path) -> Result<Stored, JobError> {
-    let key = key::artefact(context.run_id().0, context.id().0, context.lease_number().0, name)
-        .map_err(JobError::retry)?;
+    let key = objects::key(context, name)?;
     let file = File::open(path).await.map_err(JobError::retry)?;
     let limits = UploadLimits { max_bytes: u64::MAX, ..UploadLimits::default() };
     store.put_stream(&key, ReaderStream::new(file), &limits).await.map_err(JobError::retry)

@@ -14,7 +14,7 @@
 //! | `MAREY_MAX_INPUT_BYTES` | 8 GiB | unpacked files of one build |
 //! | `MAREY_MAX_BUILD_BYTES` | 2 GiB | what one job of a build keeps in memory: an archive unpacked, or what is built |
 //! | `MAREY_MAX_SESSION_FRAMES` | 432000 | frames of one session at 60 a second: two hours |
-//! | `MAREY_LOG` | `info` | filter: `info`, `warn,motion_index=debug`, … |
+//! | `MAREY_LOG` | `info,sqlx=warn` | filter: `info`, `warn,motion_index=debug`, … |
 //! | `MAREY_LOG_FORMAT` | `pretty` | `pretty` or `json` |
 
 use crate::{Error, log_format::LogFormat};
@@ -141,12 +141,12 @@ impl Config {
         let store = vars.required("MAREY_STORE", "a folder or URL for objects")?;
         let store = vars.parse("MAREY_STORE", &store)?;
         let mut config = Self { code, ..Self::new(url, store, default_listen) };
-        vars.set("MAREY_DATABASE_CONNECTIONS", &mut config.database.max_connections)?;
+        vars.set_within("MAREY_DATABASE_CONNECTIONS", &mut config.database.max_connections, 1..=1000)?;
         vars.set("MAREY_LISTEN", &mut config.grpc.listen)?;
-        vars.set("MAREY_WORKER_CONCURRENCY", &mut config.worker.concurrency)?;
+        vars.set_within("MAREY_WORKER_CONCURRENCY", &mut config.worker.concurrency, 0..=1024)?;
         config.worker.name = vars.get("MAREY_WORKER_NAME");
         let mut grace_secs = config.grpc.shutdown_grace.as_secs();
-        vars.set("MAREY_SHUTDOWN_GRACE_SECS", &mut grace_secs)?;
+        vars.set_within("MAREY_SHUTDOWN_GRACE_SECS", &mut grace_secs, 0..=86_400)?;
         config.grpc.shutdown_grace = Duration::from_secs(grace_secs);
         config.worker.shutdown_grace = Duration::from_secs(grace_secs);
         vars.set("MAREY_DATABASE_CACHE_BYTES", &mut config.memory.cache_bytes)?;
@@ -161,7 +161,7 @@ impl Config {
 /// What is logged, and how.
 #[derive(Debug, Clone, Default)]
 pub struct TelemetryConfig {
-    /// Which spans and events, in the syntax of `tracing`; default `info`.
+    /// Which spans and events, in the syntax of `tracing`; default `info,sqlx=warn`.
     pub filter: Option<String>,
     /// For people or for machines.
     pub format: LogFormat,
@@ -207,7 +207,10 @@ mod tests {
         for (name, bad) in [
             ("MAREY_LISTEN", "localhost"),
             ("MAREY_WORKER_CONCURRENCY", "-1"),
+            ("MAREY_WORKER_CONCURRENCY", "1025"),
+            ("MAREY_DATABASE_CONNECTIONS", "0"),
             ("MAREY_SHUTDOWN_GRACE_SECS", "soon"),
+            ("MAREY_SHUTDOWN_GRACE_SECS", "18446744073709551615"),
             ("MAREY_STORE", "ftp://x"),
         ] {
             let mut pairs = vec![(name, bad)];

@@ -23,15 +23,21 @@ pub enum FileError {
         expected: String,
     },
     /// A role that must be filled once.
-    #[error("the session has {}{names}; {}", role.counted(*found), if *found == 0 { "one is needed" } else { "keep one" })]
+    #[error("{}", count(*role, names))]
     Count {
         /// The role.
         role: FileRole,
-        /// How many files.
-        found: usize,
-        /// Which, or what they could be, in brackets.
-        names: String,
+        /// The files that have it.
+        names: Vec<String>,
     },
+}
+
+fn count(role: FileRole, names: &[String]) -> String {
+    let found = role.counted(names.len());
+    match names {
+        [] => format!("the session has {found} ({}); one is needed", role.endings()),
+        names => format!("the session has {found} ({}); keep one", names.join(", ")),
+    }
 }
 
 impl FileError {

@@ -35,6 +35,14 @@ pub async fn read(store: &Store, input: Input<'_>, max_bytes: u64) -> Result<Byt
     })
 }
 
+/// Where an artefact of the job goes: under its own lease.
+///
+/// # Errors
+/// To be tried again if the name can't be part of a key.
+pub fn key(job: &JobContext, name: &str) -> Result<Key, JobError> {
+    key::artefact(job.run_id().0, job.id().0, job.lease_number().0, name).map_err(JobError::retry)
+}
+
 /// Writes an artefact of the job under its own lease.
 ///
 /// # Errors
@@ -46,9 +54,7 @@ pub async fn write(
     media_type: &str,
     content: impl Into<Bytes>,
 ) -> Result<Artefact, JobError> {
-    let key =
-        key::artefact(job.run_id().0, job.id().0, job.lease_number().0, name).map_err(JobError::retry)?;
-    let stored = store.put(&key, content.into()).await.map_err(JobError::retry)?;
+    let stored = store.put(&key(job, name)?, content.into()).await.map_err(JobError::retry)?;
     Ok(artefact(name, media_type, stored))
 }
 

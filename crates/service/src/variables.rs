@@ -1,7 +1,7 @@
 //! Settings as text, by name.
 
 use crate::Error;
-use std::str::FromStr;
+use std::{fmt::Display, ops::RangeInclusive, str::FromStr};
 
 /// Where settings come from: the environment, or a map in tests.
 pub struct Variables<'a> {
@@ -29,11 +29,7 @@ impl<'a> Variables<'a> {
         self.get(name).ok_or(Error::NotSet { name, expected })
     }
 
-    pub(crate) fn parse<T: FromStr<Err: std::fmt::Display>>(
-        &self,
-        name: &'static str,
-        text: &str,
-    ) -> Result<T, Error> {
+    pub(crate) fn parse<T: FromStr<Err: Display>>(&self, name: &'static str, text: &str) -> Result<T, Error> {
         text.parse().map_err(|e: T::Err| Error::BadValue {
             name,
             found: text.to_owned(),
@@ -45,14 +41,33 @@ impl<'a> Variables<'a> {
     ///
     /// # Errors
     /// [`Error::BadValue`].
-    pub fn set<T: FromStr<Err: std::fmt::Display>>(
-        &self,
-        name: &'static str,
-        to: &mut T,
-    ) -> Result<(), Error> {
+    pub fn set<T: FromStr<Err: Display>>(&self, name: &'static str, to: &mut T) -> Result<(), Error> {
         if let Some(text) = self.get(name) {
             *to = self.parse(name, &text)?;
         }
+        Ok(())
+    }
+
+    /// [`set`](Self::set) for a number that must lie in a range.
+    ///
+    /// # Errors
+    /// [`Error::BadValue`].
+    pub fn set_within<T: FromStr<Err: Display> + PartialOrd + Display + Copy>(
+        &self,
+        name: &'static str,
+        to: &mut T,
+        range: RangeInclusive<T>,
+    ) -> Result<(), Error> {
+        let mut value = *to;
+        self.set(name, &mut value)?;
+        if !range.contains(&value) {
+            return Err(Error::BadValue {
+                name,
+                found: value.to_string(),
+                expected: format!("{} to {}", range.start(), range.end()),
+            });
+        }
+        *to = value;
         Ok(())
     }
 }

@@ -21,7 +21,7 @@ May be set:
   MAREY_MAX_INPUT_BYTES       unpacked files of one build [default: 8 GiB]
   MAREY_MAX_BUILD_BYTES       what one job of a build keeps in memory [default: 2 GiB]
   MAREY_MAX_SESSION_FRAMES    frames of one session at 60 a second [default: 432000]
-  MAREY_LOG                   filter, such as warn,motion_index=debug [default: info]
+  MAREY_LOG                   filter, such as warn,motion_index=debug [default: info,sqlx=warn]
   MAREY_LOG_FORMAT            pretty or json [default: pretty]";
 
 /// `marey serve …`
@@ -90,4 +90,28 @@ pub fn run(which: &Service) -> anyhow::Result<()> {
 /// The runtime of everything that serves.
 pub fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
     tokio::runtime::Builder::new_multi_thread().enable_all().build().context("the runtime can't be started")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::VARIABLES;
+
+    #[test]
+    fn help_names_every_variable_of_a_service_with_its_default() {
+        let table = include_str!("../../../crates/service/src/config.rs");
+        let rows = table.lines().filter_map(|line| line.strip_prefix("//! | `MAREY_"));
+        let mut count = 0;
+        for row in rows {
+            let mut cells = row.split('|').map(|cell| cell.trim().trim_matches('`'));
+            let (name, default) = (cells.next().unwrap_or_default(), cells.next().unwrap_or_default());
+            let stated =
+                VARIABLES.lines().find(|line| line.trim_start().starts_with(&format!("MAREY_{name} ")));
+            let stated = stated.unwrap_or_else(|| panic!("MAREY_{name} is not in the help"));
+            if default.starts_with(|c: char| c.is_ascii_digit()) || name.starts_with("LOG") {
+                assert!(stated.contains(&format!("[default: {default}]")), "{stated} is not {default}");
+            }
+            count += 1;
+        }
+        assert!(count >= 14, "{count}");
+    }
 }

@@ -43,9 +43,9 @@ impl Config {
     pub fn from_variables(variables: &Variables<'_>, code: Code) -> Result<Self, service::Error> {
         let service = service::Config::from_variables(variables, crate::DEFAULT_LISTEN, code)?;
         let mut config = Self::from(service);
-        variables.set("MAREY_LIVE_STREAMS", &mut config.live.max_streams)?;
+        variables.set_within("MAREY_LIVE_STREAMS", &mut config.live.max_streams, 0..=100_000)?;
         let mut idle_secs = config.live.idle_timeout.as_secs();
-        variables.set("MAREY_LIVE_IDLE_SECS", &mut idle_secs)?;
+        variables.set_within("MAREY_LIVE_IDLE_SECS", &mut idle_secs, 1..=86_400)?;
         config.live.idle_timeout = Duration::from_secs(idle_secs);
         Ok(config)
     }

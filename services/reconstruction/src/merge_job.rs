@@ -97,7 +97,7 @@ impl MergeHandler {
         let fetched = plan_job::fetch(store, &wanted, resources.memory.max_object_bytes).await?;
         let database = priors.database(&payload.request.motion_database).await?;
         let finished = finished.clone();
-        let reading = payload.request.reading();
+        let reading = payload.request.reading_options();
         let errors =
             compute::run(move || evaluate::errors(&fetched, &database, &finished.merged.motion, reading))
                 .await?;

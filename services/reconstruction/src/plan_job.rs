@@ -46,7 +46,7 @@ impl Handler for PlanHandler {
             let selection = inputs::Selection {
                 points: &asked.choice.points,
                 markers: &markers,
-                reading: asked.reading(),
+                reading: asked.reading_options(),
             };
             let mut evidence = inputs::read(&files, &selection, prior.database.skeleton())?;
             if is_synthetic(prior.database.skeleton()) {

@@ -107,10 +107,8 @@ fn calibration_file(files: &[InputFile]) -> Result<&InputFile, InputError> {
     match found[..] {
         [only] => Ok(only),
         _ => {
-            let names: Vec<&str> = found.iter().map(|file| file.name.as_str()).collect();
-            let role = FileRole::Calibration;
-            let names = if names.is_empty() { role.endings() } else { names.join(", ") };
-            Err(FileError::Count { role, found: found.len(), names: format!(" ({names})") }.into())
+            let names = found.iter().map(|file| file.name.clone()).collect();
+            Err(FileError::Count { role: FileRole::Calibration, names }.into())
         }
     }
 }

@@ -34,6 +34,10 @@ impl CallError for StreamEnd {
 
 impl From<StreamEnd> for tonic::Status {
     fn from(end: StreamEnd) -> Self {
-        proto::status(&end)
+        match end {
+            // an orderly end: nothing to log
+            StreamEnd::ShuttingDown => Self::unavailable(end.to_string()),
+            end => proto::status(&end),
+        }
     }
 }
