@@ -58,7 +58,7 @@ pub struct MotionDatabase {
 pub struct Run {
     /// id
     pub id: String,
-    /// reconstruction, motion-database
+    /// sparse, motion-database
     pub kind: String,
     /// queued, running, succeeded, failed, cancelled
     pub state: String,

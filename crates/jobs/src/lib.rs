@@ -17,4 +17,4 @@ mod versions;
 
 pub use artefacts::{InputFile, Object, file_part, named};
 pub use report::JobReport;
-pub use session::{CameraChoice, PointChoice, SessionInputs};
+pub use session::{CameraChoice, PointChoice, SessionInputs, bvh_centimetres};

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::{
-    InputFile, JobReport, Object,
+    InputFile, JobReport, Object, bvh_centimetres,
     run_json::{FileReport, LearnedFrom, Request, Subject, VersionReport},
 };
 
@@ -44,16 +44,12 @@ pub struct PlanMotionDatabase {
     #[serde(default = "one")]
     pub shards: usize,
     /// Metres of one unit of BVH files.
-    #[serde(default = "centimetres")]
+    #[serde(default = "bvh_centimetres")]
     pub bvh_metres_per_unit: f64,
 }
 
 fn one() -> usize {
     1
-}
-
-fn centimetres() -> f64 {
-    formats::BvhOptions::default().metres_per_unit
 }
 
 impl Job for PlanMotionDatabase {

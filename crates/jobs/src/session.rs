@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 
+use formats::BvhOptions;
 use model::Axis;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
@@ -8,6 +9,11 @@ use crate::{
     InputFile,
     run_json::{FileReport, SessionReport, Subject},
 };
+
+/// Metres of one unit of a BVH file, whose format has no unit, where nothing else is said.
+pub fn bvh_centimetres() -> f64 {
+    BvhOptions::default().metres_per_unit
+}
 
 /// The capture session of a run: the part that the payloads of all run kinds on sessions have in common.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -8,7 +8,7 @@ use skeleton_fit::{LimbScale, Sizes};
 use sparse::Parameters;
 
 use crate::{
-    JobReport, Object, PointChoice, SessionInputs,
+    JobReport, Object, PointChoice, SessionInputs, bvh_centimetres,
     motion_database::MotionDatabaseFile,
     run_json::{LearnedFrom, Request, Subject},
 };
@@ -28,14 +28,10 @@ pub struct PlanSparse {
     #[serde(flatten)]
     pub choice: PointChoice,
     /// Metres of one unit of BVH files.
-    #[serde(default = "centimetres")]
+    #[serde(default = "bvh_centimetres")]
     pub bvh_metres_per_unit: f64,
     /// All resolved.
     pub parameters: Parameters,
-}
-
-fn centimetres() -> f64 {
-    BvhOptions::default().metres_per_unit
 }
 
 impl Job for PlanSparse {
@@ -44,7 +40,7 @@ impl Job for PlanSparse {
 
 impl PlanSparse {
     /// How the session's files are to be read.
-    pub fn reading(&self) -> session::Options {
+    pub fn reading_options(&self) -> session::Options {
         session::Options {
             points: PointsOptions { up: self.inputs.up, sigma_m: self.parameters.control_sigma_m },
             bvh: BvhOptions { metres_per_unit: self.bvh_metres_per_unit },

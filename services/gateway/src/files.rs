@@ -47,7 +47,7 @@ fn role_schema() -> openapi::Object {
 
 /// Those of files of sessions.
 pub(crate) fn session_role_schema() -> openapi::Object {
-    words_schema(FileRole::of_sessions())
+    words_schema(FileRole::session_roles())
 }
 
 fn words_schema(roles: impl IntoIterator<Item = FileRole>) -> openapi::Object {

@@ -45,7 +45,7 @@ pub fn check_file_name(name: &str) -> Result<()> {
     Ok(())
 }
 
-/// Checks the name of a motion database or body model: letters, digits, `.`, `_` and `-`, so that it can be part of a path.
+/// Checks the name of a motion database, body model or project: letters, digits, `.`, `_` and `-`, so that it can be part of a path.
 pub(crate) fn check_versioned_name(what: &str, name: &str) -> Result<()> {
     let good = (1..=64).contains(&name.len())
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
@@ -57,7 +57,7 @@ pub(crate) fn check_versioned_name(what: &str, name: &str) -> Result<()> {
             name.chars().take(80).collect::<String>()
         )));
     }
-    if Uuid::parse_str(name).is_ok() {
+    if as_id(name).is_some() {
         return Err(Error::Unprocessable(format!("{name:?} is not a valid {what} name: it is an id")));
     }
     Ok(())

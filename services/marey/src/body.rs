@@ -15,7 +15,9 @@ use client::{
 use formats::archive::{self, Entry, Limits};
 use serde_json::{Value, json};
 
-use crate::{database::or_removed, pack, watch, words::counted};
+use model::counted;
+
+use crate::{database::or_removed, pack, watch};
 
 /// `marey body …`
 #[derive(Debug, clap::Subcommand)]

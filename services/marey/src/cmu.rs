@@ -12,7 +12,7 @@ use anyhow::{Context, bail};
 use formats::asf;
 use ureq::{Agent, http::StatusCode};
 
-use crate::words::counted;
+use model::counted;
 
 /// Where the database is.
 const CMU: &str = "http://mocap.cs.cmu.edu";
@@ -227,7 +227,7 @@ impl Subject<'_> {
         if have > 0 {
             request = request.header("Range", format!("bytes={have}-"));
         }
-        let response = request.call().context("can't connect to the server")?;
+        let response = request.call().context("the server can't be asked")?;
         match response.status() {
             StatusCode::NOT_FOUND => {
                 fs::remove_file(part)?;

@@ -5,13 +5,10 @@ use std::path::PathBuf;
 use anyhow::{anyhow, ensure};
 use client::{Client, MotionDatabase, Run, ServerArgs, encode, numbers::positive, parameters::values};
 use jobs::motion_database::{Augment, Error};
-use model::shown;
+use model::{counted, shown};
 use serde_json::{Map, Value, json};
 
-use crate::{
-    database_show, pack, watch,
-    words::{counted, name},
-};
+use crate::{database_show, pack, watch, words::name};
 
 /// `marey db …`
 #[derive(Debug, clap::Subcommand)]

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use client::MotionDatabase;
 use serde::Deserialize;
 
-use crate::words::counted;
+use model::counted;
 
 /// A motion database and what is in it.
 #[derive(Debug, Deserialize)]

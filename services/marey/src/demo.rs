@@ -17,6 +17,8 @@ use client::{Client, MotionDatabase};
 use service::config::{TelemetryConfig, Variables, environment};
 
 use self::{held_out::HeldOut, summary::Summary};
+use model::counted;
+
 use crate::{
     database,
     folders::{new_folder, remove},
@@ -25,7 +27,6 @@ use crate::{
     take::Take,
     up::{self, Everything},
     watch,
-    words::counted,
 };
 
 /// Where the demo's server keeps its things.

@@ -39,20 +39,21 @@ fn http(url: &str) -> anyhow::Result<()> {
     match agent.get(&url).call() {
         Ok(_) => Ok(()),
         Err(ureq::Error::StatusCode(status)) => bail!("{url} answers {status}"),
-        Err(error) => Err(error).with_context(|| format!("can't connect to {url}")),
+        Err(error) => Err(error).with_context(|| format!("{url} can't be asked")),
     }
 }
 
 async fn grpc(address: &str) -> anyhow::Result<()> {
     let check = async {
         let channel = tonic::transport::Endpoint::from_shared(format!("http://{address}"))?.connect().await?;
-        let answer = HealthClient::new(channel).check(HealthCheckRequest { service: String::new() }).await?;
+        let asked = HealthClient::new(channel).check(HealthCheckRequest { service: String::new() }).await;
+        let answer = asked.map_err(|status| anyhow::anyhow!("{}", status.message()))?;
         anyhow::Ok(answer.into_inner().status())
     };
     let status = tokio::time::timeout(TIMEOUT, check)
         .await
         .with_context(|| format!("{address} does not answer"))?
-        .with_context(|| format!("can't connect to {address}"))?;
+        .with_context(|| format!("{address} can't be asked"))?;
     if status != ServingStatus::Serving {
         bail!("{address} says {}", status.as_str_name());
     }

@@ -24,10 +24,9 @@ use client::{
     parameters::values,
 };
 
-use crate::{
-    serve::runtime,
-    words::{counted, name},
-};
+use model::counted;
+
+use crate::{serve::runtime, words::name};
 use source::{Measured, Source};
 
 /// After a connection was lost: from the first attempt to the next one, doubled up to the longest wait.

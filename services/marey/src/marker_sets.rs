@@ -12,7 +12,7 @@ use markers::{Fit, MarkerMap, fits, standard_names};
 use model::{Axis, PointTrajectories};
 use serde_json::{Map, Value};
 
-use crate::words::counted;
+use model::counted;
 
 /// Fits that are shown.
 const SHOWN: usize = 3;

@@ -10,7 +10,7 @@ use anyhow::{Context, bail};
 use evaluation::{ControlSet, control_trajectories};
 use sample_motion::{Action, DrawOptions, FRAME_RATE, Model, NOTICE};
 
-use crate::words::counted;
+use model::counted;
 
 /// Performers that the trials are of.
 const NUM_SUBJECTS: u32 = 4;

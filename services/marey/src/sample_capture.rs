@@ -10,12 +10,12 @@ use body::{BodyModel, Posed, Wanted};
 use formats::{calibration, image_files, ply};
 use indicatif::ProgressBar;
 use inverse_kinematics::Recording;
-use model::{Camera, Mesh};
+use model::{Camera, Mesh, counted};
 use sample_motion::{Action, DrawOptions, FRAME_RATE, Model};
 use serde_json::{Value, json};
 use vision::scene::{Ring, silhouettes};
 
-use crate::{folders::empty_folder, words::counted};
+use crate::folders::empty_folder;
 
 /// Frames of drawn motion from one picture to the next: 30 pictures a second.
 const STEP: usize = 2;

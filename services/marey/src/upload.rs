@@ -7,9 +7,11 @@ use client::{Client, ServerArgs, Session, encode};
 use formats::FileRole;
 use serde_json::Value;
 
+use model::counted;
+
 use crate::{
     session_files::{self, SessionFile},
-    words::{counted, name},
+    words::name,
 };
 
 /// Upload what was recorded: control points and a skeleton, or a calibration and what the cameras saw

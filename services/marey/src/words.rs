@@ -1,6 +1,4 @@
-//! Names on the command line, and words that depend on numbers.
-
-pub use model::counted;
+//! Names on the command line.
 
 /// A name on the command line.
 ///

@@ -11,7 +11,7 @@ use anyhow::{Context, bail, ensure};
 use client::{
     Client, Latency, MotionDatabase, Server, ServerArgs,
     live::{Connection, frame_message},
-    numbers::positive,
+    numbers::{at_least_one, positive},
     outputs,
     parameters::values,
 };
@@ -70,10 +70,6 @@ pub struct Args {
     json: Option<PathBuf>,
     #[command(flatten)]
     server: ServerArgs,
-}
-
-fn at_least_one(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|count| *count > 0).ok_or_else(|| "must be at least 1".to_owned())
 }
 
 /// What was measured.

@@ -44,7 +44,7 @@ pub struct Args {
     #[command(flatten)]
     sweep: SweepArgs,
     /// Only the first frames of each trial, at 60 a second
-    #[arg(long, default_value_t = 120, value_parser = positive)]
+    #[arg(long, default_value_t = 120, value_parser = client::numbers::at_least_one)]
     frames: usize,
     /// Only trials of these actions (column action of index.csv)
     #[arg(long, value_delimiter = ',', value_name = "ACTION")]
@@ -95,13 +95,6 @@ pub(super) enum Part {
     Report,
     /// all
     All,
-}
-
-fn positive(text: &str) -> Result<usize, String> {
-    text.parse()
-        .ok()
-        .filter(|n| *n > 0)
-        .ok_or_else(|| format!("found {text:?}, expected a number of frames, 1 or more"))
 }
 
 /// Runs `marey evaluate sparse`.

@@ -2,7 +2,7 @@
 
 use jobs::{
     InputFile,
-    body_model::{self, BuildBodyModel, VersionName},
+    body_model::{BuildBodyModel, VersionName},
 };
 use serde::Deserialize;
 use sqlx::PgConnection;
@@ -62,6 +62,6 @@ impl Build for NewBodyModelBuild {
             components: self.components.unwrap_or(body::MAX_COMPONENTS),
             metres_per_unit: self.metres_per_unit,
         };
-        NewRun::new(body_model::RUN_KIND, &payload)
+        NewRun::new(&payload)
     }
 }

@@ -1,5 +1,6 @@
 //! What starting a run is, whatever its kind: the run, its first job and what it uses, in the transaction that answers.
 
+use jobs::run_json::Request;
 use queue::{ChildJob, Job, ProjectId};
 use sqlx::{PgConnection, Postgres, Transaction};
 use uuid::Uuid;
@@ -18,10 +19,10 @@ pub(crate) struct NewRun {
 }
 
 impl NewRun {
-    /// A run of that kind, which begins with that job.
-    pub fn new(kind: &'static str, first_job: &impl Job) -> Result<Self> {
+    /// A run that begins with that job.
+    pub fn new(first_job: &(impl Job + Request)) -> Result<Self> {
         Ok(Self {
-            kind,
+            kind: first_job.run_kind(),
             first_job: ChildJob::new(first_job)?,
             session_id: None,
             motion_database_id: None,

@@ -131,7 +131,7 @@ impl SessionRun for InverseKinematicsRun {
         let body_model = cameras::body_model(db, project_id, self.body_model.as_deref()).await?;
         let run = if solver.uses_images() {
             let plan = self.cameras.plan(on, &body_model, self.up, Some(how))?;
-            NewRun::new(RUN_KIND, &plan)?
+            NewRun::new(&plan)?
         } else {
             let solve = SolveInverseKinematics {
                 inputs: on.inputs(self.up),
@@ -139,7 +139,7 @@ impl SessionRun for InverseKinematicsRun {
                 how,
                 cameras: None,
             };
-            NewRun::new(RUN_KIND, &solve)?
+            NewRun::new(&solve)?
         };
         Ok(run.on_session(session_id).with_body_model(body_model.id()))
     }

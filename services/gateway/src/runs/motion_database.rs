@@ -1,7 +1,7 @@
 //! Building motion databases.
 
 use jobs::{
-    InputFile,
+    InputFile, bvh_centimetres,
     motion_database::{self, PlanMotionDatabase, VersionName},
 };
 use serde::Deserialize;
@@ -80,11 +80,9 @@ impl Build for NewBuild {
             files,
             augment: self.augment_like(db, base).await?.into(),
             shards: self.shards.unwrap_or_else(|| shards_like(base)),
-            bvh_metres_per_unit: self
-                .bvh_metres_per_unit
-                .unwrap_or(formats::BvhOptions::default().metres_per_unit),
+            bvh_metres_per_unit: self.bvh_metres_per_unit.unwrap_or_else(bvh_centimetres),
         };
-        let run = NewRun::new(motion_database::RUN_KIND, &payload)?;
+        let run = NewRun::new(&payload)?;
         Ok(run.with_motion_database(row.base_id))
     }
 }

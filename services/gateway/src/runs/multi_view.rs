@@ -54,7 +54,7 @@ impl SessionRun for MultiViewRun {
         let session_id = on.session.id;
         let body_model = cameras::body_model(db, project_id, self.body_model.as_deref()).await?;
         let plan = self.cameras.plan(on, &body_model, self.up, None)?;
-        let run = NewRun::new(multi_view::RUN_KIND, &plan)?;
+        let run = NewRun::new(&plan)?;
         Ok(run.on_session(session_id).with_body_model(body_model.id()))
     }
 }

@@ -45,18 +45,18 @@ impl<'de> Deserialize<'de> for NewSessionRun {
 impl NewSessionRun {
     /// Refuses what makes no sense on any session, where the kind is named.
     pub fn check(&self) -> Result<()> {
-        self.kind.map_or(Ok(()), |kind| read(kind, "", self.fields.clone()).map(drop))
+        self.kind.map_or(Ok(()), |kind| read(kind, self.fields.clone()).map(drop))
     }
 
     /// The run: everything that decides its result.
     pub async fn plan(self, db: &mut PgConnection, project_id: Uuid, on: OnSession) -> Result<NewRun> {
         let Some(kind) = self.kind else {
             let (kind, because) = implied(&self.fields, &on)?;
-            let because = format!("{because}, so kind is {}: ", kind.name);
-            let asked = read(kind, &because, self.fields)?;
-            return asked.plan(db, project_id, on).await.map_err(|error| error.because(&because));
+            let because = |error: Error| error.because(&format!("{because}, so kind is {}: ", kind.name));
+            let asked = read(kind, self.fields).map_err(because)?;
+            return asked.plan(db, project_id, on).await.map_err(because);
         };
-        read(kind, "", self.fields)?.plan(db, project_id, on).await
+        read(kind, self.fields)?.plan(db, project_id, on).await
     }
 }
 
@@ -104,7 +104,7 @@ fn required_by(is_given: impl Fn(&str) -> bool) -> Option<(&'static Kind, String
 }
 
 /// Reads a request as one of that kind. A field that is null counts as left out.
-fn read(kind: &Kind, because: &str, mut fields: Map<String, Value>) -> Result<Box<dyn Asked>> {
+fn read(kind: &Kind, mut fields: Map<String, Value>) -> Result<Box<dyn Asked>> {
     let own = (kind.object)().properties;
     for (name, value) in fields.iter().filter(|(name, _)| !own.contains_key(*name)) {
         let others: Vec<&Kind> =
@@ -118,13 +118,13 @@ fn read(kind: &Kind, because: &str, mut fields: Map<String, Value>) -> Result<Bo
         };
         let has: Vec<&str> = own.keys().map(String::as_str).collect();
         return Err(Error::Unprocessable(format!(
-            "{because}{name} is not a field of {} runs{belongs}; they have: {}",
+            "{name} is not a field of {} runs{belongs}; they have: {}",
             kind.name,
             has.join(", ")
         )));
     }
     fields.retain(|_, value| !value.is_null());
-    kind.read(fields).map_err(|error| error.because(because))
+    kind.read(fields)
 }
 
 /// Names of kinds, as a sentence has them.

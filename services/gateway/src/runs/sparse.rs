@@ -3,7 +3,7 @@
 use ::sparse::{Method, Parameters};
 use formats::FileRole;
 use jobs::{
-    PointChoice,
+    PointChoice, bvh_centimetres,
     sparse::{self, PlanSparse},
 };
 use serde::Deserialize;
@@ -104,12 +104,10 @@ impl SessionRun for SparseRun {
             inputs: on.inputs(self.up),
             motion_database,
             choice,
-            bvh_metres_per_unit: self
-                .bvh_metres_per_unit
-                .unwrap_or(formats::BvhOptions::default().metres_per_unit),
+            bvh_metres_per_unit: self.bvh_metres_per_unit.unwrap_or_else(bvh_centimetres),
             parameters,
         };
-        let run = NewRun::new(sparse::RUN_KIND, &plan)?;
+        let run = NewRun::new(&plan)?;
         Ok(run.on_session(session_id).with_motion_database(Some(database.id())))
     }
 }

@@ -1,6 +1,6 @@
 //! Training models on motion databases.
 
-use jobs::motion_database::{TRAINING_RUN_KIND, TrainGplvm};
+use jobs::motion_database::TrainGplvm;
 use regression::gplvm::TrainingOptions;
 use serde::Deserialize;
 use serde_json::{Map, Value};
@@ -58,7 +58,7 @@ pub(crate) async fn train(by: &Access, which: &str, posted: Posted<NewTraining>)
     let database: MotionDatabase =
         versioned::find(&mut tx, project_id, which, Latest::Ready, Lock::Share).await?;
     let payload = TrainGplvm { motion_database: database.ready()?, parameters };
-    let run = NewRun::new(TRAINING_RUN_KIND, &payload)?.with_motion_database(Some(database.id()));
+    let run = NewRun::new(&payload)?.with_motion_database(Some(database.id()));
     let run_id = run.enqueue(&mut tx, project_id).await?;
     accept(tx, &request, project_id, run_id).await
 }

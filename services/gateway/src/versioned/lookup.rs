@@ -59,7 +59,7 @@ fn as_version(text: &str) -> Option<i32> {
     text.parse().ok().filter(|version: &i32| version.to_string() == text)
 }
 
-/// The same for a caller who only looks.
+/// [`find`] for a caller who only looks.
 pub(crate) async fn look<V: Versioned>(by: &Access, which: &str, latest: Latest) -> Result<V> {
     let mut db = by.app.db.acquire().await?;
     find(&mut db, by.caller.project_id, which, latest, Lock::None).await

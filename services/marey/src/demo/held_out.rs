@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use crate::{
-    take::{Take, Takes},
-    words::counted,
-};
+use model::counted;
+
+use crate::take::{Take, Takes};
 
 /// Takes that are held out, at most: the standard error of their mean is less than a fifth of their spread.
 const MOST: usize = 32;

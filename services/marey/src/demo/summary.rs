@@ -9,7 +9,7 @@ use super::{
     strip::strip,
     trials::{self, METHODS, Outcome, POINT_SETS, TrialErrors},
 };
-use crate::words::counted;
+use model::counted;
 
 /// What drawn motion must come to: far above what it does come to, far below what a broken step would.
 const MOST_ANGLES_DEG: f64 = 10.0;
