@@ -22,15 +22,19 @@ pub enum FileError {
         /// What should be.
         expected: String,
     },
-    /// A role that must be filled once.
-    #[error("the session has {}{names}; {}", role.counted(*found), if *found == 0 { "one is needed" } else { "keep one" })]
-    Count {
+    /// A role that must be filled, and isn't.
+    #[error("the session has {} ({}); one is needed", role.counted(0), role.endings())]
+    Missing {
         /// The role.
         role: FileRole,
-        /// How many files.
-        found: usize,
-        /// Which, or what they could be, in brackets.
-        names: String,
+    },
+    /// A role that must be filled once, and is more often.
+    #[error("{}", role.keep_one(&names.iter().map(String::as_str).collect::<Vec<_>>()))]
+    Several {
+        /// The role.
+        role: FileRole,
+        /// Names of the files.
+        names: Vec<String>,
     },
 }
 

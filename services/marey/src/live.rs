@@ -338,18 +338,13 @@ async fn send(mut feed: Feed, mut sender: Sender, over: CancellationToken) -> an
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::alone::Alone;
     use clap::Parser;
     use futures::{SinkExt, StreamExt};
     use tokio_tungstenite::tungstenite::{
         Message,
         protocol::{CloseFrame, frame::coding::CloseCode},
     };
-
-    #[derive(Debug, clap::Parser)]
-    struct Alone {
-        #[command(flatten)]
-        args: Args,
-    }
 
     #[test]
     fn what_is_written_replaces_nothing_that_is_read() {
@@ -363,7 +358,7 @@ mod tests {
             let (output, state) = (path(output), path(state));
             let words = ["live", &points, "-d", "walks", "--skeleton", &skeleton];
             let words = words.into_iter().chain(["-o", &output, "--state-file", &state]);
-            check_outputs(&Alone::parse_from(words).args).map_err(|error| error.to_string())
+            check_outputs(&Alone::<Args>::parse_from(words).args).map_err(|error| error.to_string())
         };
         assert_eq!(check("poses.csv", "p.state"), Ok(()));
         for (output, state, expected) in [

@@ -137,11 +137,8 @@ pub(crate) fn measured_points(
     reading: session::Options,
     warnings: &mut Vec<String>,
 ) -> Result<(String, PointTrajectories), InputError> {
-    let file = at_most_one(files, FileRole::ControlPoints)?.ok_or_else(|| FileError::Count {
-        role: FileRole::ControlPoints,
-        found: 0,
-        names: format!(" ({})", FileRole::ControlPoints.endings()),
-    })?;
+    let role = FileRole::ControlPoints;
+    let file = at_most_one(files, role)?.ok_or(FileError::Missing { role })?;
     Ok((file.name.clone(), read_points(file, reading, warnings)?))
 }
 
@@ -163,9 +160,8 @@ fn note<T>(read: Read<T>, file: &NamedBytes, warnings: &mut Vec<String>) -> T {
 fn at_most_one(files: &[NamedBytes], role: FileRole) -> Result<Option<&NamedBytes>, InputError> {
     let found: Vec<&NamedBytes> = files.iter().filter(|f| f.role == role).collect();
     if found.len() > 1 {
-        let names = found.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
-        let names = format!(" ({names})");
-        return Err(FileError::Count { role, found: found.len(), names }.into());
+        let names = found.iter().map(|file| file.name.clone()).collect();
+        return Err(FileError::Several { role, names }.into());
     }
     Ok(found.first().copied())
 }

@@ -195,8 +195,8 @@ impl InverseKinematicsRequest {
         let Some(name) = &self.solver else { return Ok(None) };
         serde_json::from_value(name.as_str().into()).map(Some).map_err(|_| {
             Error::Unprocessable(format!(
-                "inverse_kinematics.solver is {name:?}, expected plain, priority, image-constrained, extended, image-first or \
-                 reach-then-image-then-posture"
+                "inverse_kinematics.solver is {name:?}, expected plain, priority, image-constrained, extended, \
+                 image-first or reach-then-image-then-posture"
             ))
         })
     }
@@ -209,8 +209,8 @@ impl InverseKinematicsRequest {
             None if has_cameras => Ok(Method::ImageConstrained),
             None => Ok(Method::Priority),
             Some(solver) if solver.uses_images() && !has_cameras => Err(Error::Unprocessable(format!(
-                "inverse_kinematics.solver is {:?}, which needs silhouettes; upload a calibration and what the cameras saw, or choose plain or \
-                 priority",
+                "inverse_kinematics.solver is {:?}, which needs silhouettes; upload a calibration and what the cameras \
+                 saw, or choose plain or priority",
                 self.solver.as_deref().unwrap_or_default()
             ))),
             Some(solver) => Ok(solver),
