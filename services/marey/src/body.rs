@@ -243,6 +243,7 @@ fn entries(paths: &[PathBuf]) -> anyhow::Result<Vec<Entry>> {
 }
 
 fn learn_here(args: &LearnArgs, out: &Path) -> anyhow::Result<()> {
+    gateway::check_versioned_name("body model", &args.name)?;
     let set = ScanSet::read(entries(&args.files)?, &ScanOptions { metres_per_unit: args.unit })?;
     for warning in &set.warnings {
         eprintln!("warning: {warning}");
