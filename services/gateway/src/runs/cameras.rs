@@ -95,7 +95,7 @@ impl CameraFields {
         let mut parameters: Parameters = json::read_parameters(self.parameters.clone())?;
         if let Some(kind) = &self.background {
             if self.parameters.get("background").is_some_and(|given| !given["model"].is_null()) {
-                let what = "background is given twice: as a field and in parameters";
+                let what = "background is given twice: here and as parameters.background";
                 return Err(Error::Unprocessable(what.into()));
             }
             parameters.background.model = serde_json::from_value(kind.as_str().into()).map_err(|_| {

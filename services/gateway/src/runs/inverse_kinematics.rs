@@ -153,7 +153,10 @@ impl InverseKinematicsRequest {
             return refuse(format!("inverse_kinematics.steps is {steps}, expected 1 to {}", STEPS.0));
         }
         if let Some(rate) = self.frame_rate.filter(|rate| !FRAME_RATES.contains(rate)) {
-            return refuse(format!("inverse_kinematics.frame_rate is {}, expected 1 to 1000", shown(rate)));
+            let found = shown(rate);
+            return refuse(format!(
+                "inverse_kinematics.frame_rate is {found}, expected 1 to 1000 frames a second"
+            ));
         }
         self.check_body()
     }
