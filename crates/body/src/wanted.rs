@@ -28,13 +28,13 @@ impl Wanted {
     /// [`Error::Wanted`].
     pub fn check(&self) -> Result<()> {
         let ranges = [
-            ("stature_m", self.stature_m, 1.0, 2.4),
-            ("mass_kg", self.mass_kg, 20.0, 250.0),
-            ("age_years", self.age_years, 0.0, 120.0),
+            ("stature_m", self.stature_m, 1.0, 2.4, "m"),
+            ("mass_kg", self.mass_kg, 20.0, 250.0, "kg"),
+            ("age_years", self.age_years, 0.0, 120.0, "years"),
         ];
-        for (name, value, low, high) in ranges {
+        for (name, value, low, high, unit) in ranges {
             if let Some(value) = value.filter(|value| !(low..=high).contains(value)) {
-                let what = format!("{name} is {}, expected {low} to {high}", shown(value));
+                let what = format!("{name} is {} {unit}, expected {low} to {high} {unit}", shown(value));
                 return Err(Error::Wanted { what });
             }
         }

@@ -19,9 +19,9 @@ fn bodies_have_the_measurements_asked_for() {
         assert!((0.7..1.4).contains(&found.chest_m), "{found:?}");
     }
     let error = model.alpha_for(&Wanted { stature_m: Some(17.8), ..Wanted::default() }).unwrap_err();
-    assert_eq!(error.to_string(), "stature_m is 17.8, expected 1 to 2.4");
+    assert_eq!(error.to_string(), "stature_m is 17.8 m, expected 1 to 2.4 m");
     let error = Wanted { mass_kg: Some(1e308), ..Wanted::default() }.check().unwrap_err();
-    assert_eq!(error.to_string(), "mass_kg is 1e308, expected 20 to 250");
+    assert_eq!(error.to_string(), "mass_kg is 1e308 kg, expected 20 to 250 kg");
     assert_eq!(model.alpha_for(&Wanted::default()).unwrap(), vec![0.0; 20]);
 }
 

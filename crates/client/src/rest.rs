@@ -10,11 +10,11 @@ use std::{
 use anyhow::{Context, anyhow, bail};
 use base64::{Engine, prelude::BASE64_STANDARD};
 use serde::{Deserialize, de::DeserializeOwned};
-use serde_json::{Value, json};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 use ureq::{Agent, Body, http::Response};
 
-use crate::Server;
+use crate::{Request, Server};
 
 /// Talks to one server with one key.
 #[derive(Debug, Clone)]
@@ -116,6 +116,18 @@ struct Problem {
     detail: String,
 }
 
+/// What the server has against a request.
+#[derive(Debug)]
+struct Refused(String);
+
+impl std::fmt::Display for Refused {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Refused {}
+
 impl Client {
     /// A client of `server`.
     pub fn new(server: Server) -> Self {
@@ -160,6 +172,14 @@ impl Client {
             other => other,
         };
         self.read(self.checked(response, path)?, path)
+    }
+
+    /// POST of what options say; a refusal names these.
+    pub fn post_request<T: DeserializeOwned>(&self, path: &str, request: &Request) -> anyhow::Result<T> {
+        self.post(path, &request.to_json()).map_err(|error| match error.downcast::<Refused>() {
+            Ok(Refused(detail)) => Refused(request.in_options(&detail)).into(),
+            Err(other) => other,
+        })
     }
 
     /// DELETE.
@@ -254,7 +274,8 @@ impl Client {
 
     /// Makes a session.
     pub fn create_session(&self, name: &str) -> anyhow::Result<Session> {
-        self.post("/v1/sessions", &json!({ "name": name }))
+        let request = Request::default().with("name", "the session's name", Some(name));
+        self.post_request("/v1/sessions", &request)
     }
 
     fn at(&self, path: &str) -> String {
@@ -280,7 +301,7 @@ impl Client {
         let status = response.status();
         let text = response.body_mut().read_to_string().unwrap_or_default();
         match serde_json::from_str::<Problem>(&text) {
-            Ok(problem) => bail!("{}", problem.detail),
+            Ok(problem) => Err(Refused(problem.detail).into()),
             Err(_) => bail!("{path}: the server answered {status}"),
         }
     }

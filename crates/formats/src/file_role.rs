@@ -179,6 +179,12 @@ impl FileRole {
         }
     }
 
+    /// What is said of a session with several files of this role, where one is needed:
+    /// `the session has 2 skeleton files (a.asf, b.asf); keep one`.
+    pub fn keep_one(self, names: &[&str]) -> String {
+        format!("the session has {} ({}); keep one", self.counted(names.len()), names.join(", "))
+    }
+
     /// What a file of this role is, in words: `a skeleton`.
     pub fn in_words(self) -> &'static str {
         match self {
@@ -212,6 +218,11 @@ impl FileRole {
     /// The endings of all files that a session can have, by role: `skeleton .asf or .bvh; …`.
     pub fn session_endings() -> String {
         Self::session_roles().map(|role| format!("{role} {}", role.endings())).collect::<Vec<_>>().join("; ")
+    }
+
+    /// The endings of pictures, as a sentence has them.
+    pub fn picture_endings() -> String {
+        endings(&PICTURE)
     }
 
     /// Whether a file of that name is a picture, not compressed once more.
@@ -389,6 +400,8 @@ mod tests {
             ["no file of control points", "1 file of control points", "3 files of control points"]
         );
         assert_eq!(FileRole::Skeleton.counted(2), "2 skeleton files");
+        let several = FileRole::Calibration.keep_one(&["a.toml", "b.yaml"]);
+        assert_eq!(several, "the session has 2 calibration files (a.toml, b.yaml); keep one");
     }
 
     #[test]

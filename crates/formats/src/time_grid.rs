@@ -1,6 +1,6 @@
 //! From the times of rows to frames of a constant rate.
 
-use model::{counted, shown};
+use model::{counted, shown, shown_rate};
 
 use crate::{
     Error, Result,
@@ -63,9 +63,12 @@ impl Times {
                 let rate = period.ok_or_else(|| {
                     Error::at_line(first_line, "times that don't rise", "times that rise from row to row")
                 })?;
+                let (in_header, in_times) = (shown_rate(stated), shown_rate(rate));
                 warnings.line(
                     first_line,
-                    format!("the header says {stated} Hz, the times say {rate} Hz; the times are taken"),
+                    format!(
+                        "the header says {in_header} Hz, the times say {in_times} Hz; the times are taken"
+                    ),
                 );
                 rate
             }
@@ -84,7 +87,8 @@ impl Times {
                 return Err(Error::at_line(*line, found, "times that rise from row to row"));
             }
             if frame >= max_frames as f64 {
-                let found = format!("time {} s, frame {} at {rate} Hz", shown(*time), shown(frame));
+                let found =
+                    format!("time {} s, frame {} at {} Hz", shown(*time), shown(frame), shown_rate(rate));
                 return Err(Error::at_line(
                     *line,
                     found,
@@ -103,7 +107,7 @@ impl Times {
         if uneven > 0 {
             warnings.line(
                 first_line,
-                format!("the times of {} are off the {rate} Hz grid", counted(uneven, "row")),
+                format!("the times of {} are off the {} Hz grid", counted(uneven, "row"), shown_rate(rate)),
             );
         }
         Ok(Grid { rate, frames })

@@ -35,7 +35,7 @@ pub use motion::Motion;
 pub use point_match::PointMatch;
 pub use points::{PointTrajectories, Samples};
 pub use record::SkeletonRecord;
-pub use shown::{counted, shown};
+pub use shown::{counted, shown, shown_rate};
 pub use silhouette::Silhouette;
 pub use skeleton::Skeleton;
 

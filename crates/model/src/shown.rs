@@ -17,6 +17,17 @@ pub fn shown(number: f64) -> String {
     }
 }
 
+/// A frame rate as people read it, Hz: to a thousandth, or to three digits below 1, since rates come out of rounded periods:
+/// 59.999999999999986 is `60`, 60000 / 1001 is `59.94`.
+pub fn shown_rate(rate: f64) -> String {
+    if !(1e-6..1e9).contains(&rate) {
+        return shown(rate);
+    }
+    let digits_after_point = 3.max(2 - rate.log10().floor() as i32) as usize;
+    let rounded = format!("{rate:.digits_after_point$}");
+    rounded.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -24,6 +35,16 @@ mod tests {
     #[test]
     fn one_is_singular() {
         assert_eq!([0, 1, 2].map(|n| counted(n, "trial")), ["0 trials", "1 trial", "2 trials"]);
+    }
+
+    #[test]
+    fn rates_are_short() {
+        let ntsc = [24e3 / 1001.0, 30e3 / 1001.0, 60e3 / 1001.0, 120e3 / 1001.0];
+        assert_eq!(ntsc.map(shown_rate), ["23.976", "29.97", "59.94", "119.88"]);
+        let whole = [59.999999999999986, 60.0, 120.00000000000001, 1000.0];
+        assert_eq!(whole.map(shown_rate), ["60", "60", "120", "1000"]);
+        assert_eq!([12.5, 1.0 / 3.0, 0.0125, 1e-6].map(shown_rate), ["12.5", "0.333", "0.0125", "0.000001"]);
+        assert_eq!([0.0, -1.0, 1e12, f64::NAN].map(shown_rate), ["0", "-1", "1000000000000", "NaN"]);
     }
 
     #[test]

@@ -89,8 +89,8 @@ impl Parameters {
             ("shape_frames", self.shape_frames, 1..=16, "1 to 16"),
             ("shape_step", self.shape_step.unwrap_or(1), 1..=10_000, "1 to 10000"),
             ("largest_side", self.largest_side as usize, 64..=8192, "64 to 8192 pixels"),
-            ("chunk_frames", self.chunk_frames, 5..=3000, "5 to 3000"),
-            ("overlap_frames", self.overlap_frames, 0..=300, "0 to 300"),
+            ("chunk_frames", self.chunk_frames, 5..=3000, "5 to 3000 frames"),
+            ("overlap_frames", self.overlap_frames, 0..=300, "0 to 300 frames"),
             ("particles", self.particles, 0..=2000, "2 to 2000, or 0 for none"),
             ("iterations", self.iterations, 1..=200, "1 to 200"),
         ];

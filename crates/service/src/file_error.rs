@@ -22,22 +22,20 @@ pub enum FileError {
         /// What should be.
         expected: String,
     },
-    /// A role that must be filled once.
-    #[error("{}", count(*role, names))]
-    Count {
+    /// A role that must be filled, and isn't.
+    #[error("the session has {} ({}); one is needed", role.counted(0), role.endings())]
+    Missing {
         /// The role.
         role: FileRole,
-        /// The files that have it.
+    },
+    /// A role that must be filled once, and is more often.
+    #[error("{}", role.keep_one(&names.iter().map(String::as_str).collect::<Vec<_>>()))]
+    Several {
+        /// The role.
+        role: FileRole,
+        /// Names of the files.
         names: Vec<String>,
     },
-}
-
-fn count(role: FileRole, names: &[String]) -> String {
-    let found = role.counted(names.len());
-    match names {
-        [] => format!("the session has {found} ({}); one is needed", role.endings()),
-        names => format!("the session has {found} ({}); keep one", names.join(", ")),
-    }
 }
 
 impl FileError {

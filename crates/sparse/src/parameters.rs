@@ -220,7 +220,13 @@ impl Parameters {
         count("blend_frames", self.blend_frames, 0, 60, "0 to 60 frames")?;
         number("control_weight", self.control_weight, 0.0, 1e3, "0 to 1000 degrees per centimetre")?;
         number("skeleton_weight", self.skeleton_weight, 0.0, 1e3, "0 to 1000 degrees per centimetre")?;
-        number("start_skeleton_weight", self.start_skeleton_weight, 0.0, 1e3, "0 to 1000")?;
+        number(
+            "start_skeleton_weight",
+            self.start_skeleton_weight,
+            0.0,
+            1e3,
+            "0 to 1000 degrees per centimetre",
+        )?;
         number("control_sigma_m", self.control_sigma_m, 1e-5, 1.0, "0.00001 to 1 m")?;
         number("ridge_deg", self.ridge_deg, 1e-3, 1e3, "0.001 to 1000 degrees")?;
         number("ridge_distance", self.ridge_distance, 0.0, 1e3, "0 to 1000")?;

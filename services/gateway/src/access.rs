@@ -61,11 +61,22 @@ pub fn project_name(name: &str) -> Result<String, String> {
     Ok(name.to_owned())
 }
 
-/// Makes an API key for a project, and the project when there is none of that name. The key itself is returned
-/// and nowhere kept.
+/// A key's label as it may be: empty, or a line of text.
 ///
 /// # Errors
-/// If the database fails or the project's name is not letters, digits, `.`, `_`, `-`.
+/// A text that is none, with what is expected.
+pub fn key_label(label: &str) -> Result<String, String> {
+    if !label.is_empty() {
+        names::check_line("the label", label).map_err(|error| error.to_string())?;
+    }
+    Ok(label.to_owned())
+}
+
+/// Makes an API key for a project, and the project when there is none of that name. The key itself is returned
+/// and nowhere kept. Names are checked by whoever takes them from people: [`project_name`], [`key_label`].
+///
+/// # Errors
+/// If the database fails.
 pub async fn create_key(
     connection: &mut PgConnection,
     project: &str,
@@ -209,5 +220,25 @@ impl FromRequestParts<App> for Writer {
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Error> {
         Access::with(parts, app, Scope::Write).await.map(Self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_label_is_a_line_of_text_or_nothing() {
+        for good in ["", "wall display", "Läufer 1", &"x".repeat(200)] {
+            assert_eq!(key_label(good), Ok(good.to_owned()));
+        }
+        for (bad, expected) in [
+            ("a\u{1b}[2J", "the label has the control character '\\u{1b}', expected a line of text"),
+            ("two\nlines", "the label has the control character '\\n', expected a line of text"),
+            (" ", "the label is blank, expected a line of text"),
+            (&"x".repeat(400), "the label has 400 characters, expected 1 to 200"),
+        ] {
+            assert_eq!(key_label(bad), Err(expected.to_owned()));
+        }
     }
 }

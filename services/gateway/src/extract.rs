@@ -81,7 +81,7 @@ impl<T: DeserializeOwned> FromRequest<App> for Posted<T> {
             check_is_json(&headers)?;
             &body[..]
         };
-        let parsed = json::read(&json::parse(text)?)?;
+        let parsed = json::read(&json::parse("body", text)?)?;
         Ok(Self { body: parsed, request: RequestKey::read(&headers, &method, &path, &body)? })
     }
 }

@@ -6,7 +6,7 @@ use std::{cell::RefCell, fmt};
 use serde::{
     Deserializer,
     de::{
-        DeserializeOwned, DeserializeSeed, Error as _, MapAccess, SeqAccess, Unexpected, Visitor,
+        DeserializeOwned, DeserializeSeed, Error as _, Expected, MapAccess, SeqAccess, Unexpected, Visitor,
         value::{BorrowedStrDeserializer, MapAccessDeserializer},
     },
     forward_to_deserialize_any,
@@ -18,14 +18,14 @@ use crate::{
     refusal::{Refusal, Step, one_of, path},
 };
 
-/// Reads the body of a request.
-pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
+/// Reads the body of a request, or a message; `what` it is, in words.
+pub(crate) fn parse(what: &str, bytes: &[u8]) -> Result<Value> {
     let fault = RefCell::new(None);
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     let value = Strict { place: &Place { outer: None, step: None }, fault: &fault }
         .deserialize(&mut reader)
         .and_then(|value| reader.end().map(|()| value))
-        .map_err(|error| Error::BadRequest(format!("body is not JSON: {error}")))?;
+        .map_err(|error| Error::BadRequest(format!("{what} is not JSON: {error}")))?;
     fault.into_inner().map_or(Ok(value), |fault| Err(Error::Unprocessable(fault)))
 }
 
@@ -184,11 +184,13 @@ impl<'de> Deserializer<'de> for Node<'de> {
             },
             Value::String(text) => visitor.visit_borrowed_str(text),
             Value::Array(array) => {
+                // the visitor knows its length, and is gone when it turns out that there are more
+                let expected = (&visitor as &dyn Expected).to_string();
                 let mut items = Items { rest: array, number: 0 };
                 let value = visitor.visit_seq(&mut items)?;
                 match items.rest {
                     [] => Ok(value),
-                    _ => Err(Refusal::invalid_length(array.len(), &"fewer")),
+                    _ => Err(Refusal::invalid_length(array.len(), &expected.as_str())),
                 }
             }
             Value::Object(object) => visitor.visit_map(Fields::new(object, &[])),
@@ -393,7 +395,8 @@ mod tests {
             (json!({"name": "a", "inner": {"on": 1}}), "inner.on is 1, expected true or false"),
             (json!({"name": "a", "map": {"k": {}}}), "map.k is an object, expected text"),
             (json!({"name": "a", "map": []}), "map is an array, expected an object"),
-            (json!({"name": "a", "place": [1, 2, 3]}), "place is an array of 3, expected fewer"),
+            (json!({"name": "a", "place": [1, 2, 3]}), "place is an array of 3, expected one of 2"),
+            (json!({"name": "a", "place": [1]}), "place is an array of 1, expected one of 2"),
         ] {
             assert_eq!(refused(&request), expected, "{request}");
         }
@@ -402,7 +405,7 @@ mod tests {
     #[test]
     fn keys_are_given_once_and_no_text_has_a_nul() {
         assert_eq!(
-            parse(b"{\"a\": [1, -2, 2.5, null, true, \"x\"]}").unwrap(),
+            parse("body", b"{\"a\": [1, -2, 2.5, null, true, \"x\"]}").unwrap(),
             json!({"a": [1, -2, 2.5, null, true, "x"]})
         );
         for (body, expected) in [
@@ -414,12 +417,12 @@ mod tests {
             ),
             (r#""\u0000""#, "the request has a NUL character (\\u0000), expected text without"),
         ] {
-            let refused = parse(body.as_bytes()).unwrap_err();
+            let refused = parse("body", body.as_bytes()).unwrap_err();
             assert!(matches!(&refused, Error::Unprocessable(said) if said == expected), "{body}: {refused}");
         }
-        assert!(matches!(parse(br#"{"a\u0000": 1}"#), Err(Error::Unprocessable(_))));
+        assert!(matches!(parse("body", br#"{"a\u0000": 1}"#), Err(Error::Unprocessable(_))));
         for body in ["", "{", "{} {}", r#"{"a": 1, "a": 2"#] {
-            assert!(matches!(parse(body.as_bytes()), Err(Error::BadRequest(_))), "{body}");
+            assert!(matches!(parse("body", body.as_bytes()), Err(Error::BadRequest(_))), "{body}");
         }
     }
 }

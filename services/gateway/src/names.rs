@@ -4,10 +4,10 @@ use uuid::Uuid;
 
 use crate::error::{Error, Result};
 
-/// Longest name of a session or file, and longest tag, characters.
+/// Longest name of a session or file, longest tag and longest label of a key, characters.
 const MAX_NAME_CHARS: usize = 200;
 
-/// Checks the name of a session, or a tag: any text of one line.
+/// Checks the name of a session, a tag, or the label of a key: any text of one line.
 pub(crate) fn check_line(field: &str, text: &str) -> Result<()> {
     let refuse = |what: String| Err(Error::Unprocessable(format!("{field} {what}")));
     let length = text.chars().count();
@@ -45,8 +45,12 @@ pub fn check_file_name(name: &str) -> Result<()> {
     Ok(())
 }
 
-/// Checks the name of a motion database, body model or project: letters, digits, `.`, `_` and `-`, so that it can be part of a path.
-pub(crate) fn check_versioned_name(what: &str, name: &str) -> Result<()> {
+/// Checks the name of a motion database, body model or project: letters, digits, `.`, `_` and `-`, so that it can be part
+/// of a path.
+///
+/// # Errors
+/// [`Error::Unprocessable`] says what is wrong with it; `what` is what has the name.
+pub fn check_versioned_name(what: &str, name: &str) -> Result<()> {
     let good = (1..=64).contains(&name.len())
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
         && name.as_bytes()[0].is_ascii_alphanumeric();

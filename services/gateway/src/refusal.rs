@@ -179,6 +179,9 @@ fn expected_in_words(expected: &str) -> String {
         "a sequence" => "an array",
         "a map" => "an object",
         other if other.starts_with("struct ") => "an object",
+        other if other.starts_with("an array of length ") => {
+            return other.replacen("an array of length", "one of", 1);
+        }
         other if other.starts_with("tuple ") => "an array",
         other => other,
     }

@@ -6,14 +6,14 @@ use std::{
 };
 
 use ::body::{BodyModel, LearnOptions, Sex, Wanted};
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use body::{ScanOptions, ScanSet, shipped};
 use client::{
-    Client, Run, ServerArgs, encode,
+    Client, Request, Run, ServerArgs, encode,
     numbers::{finite, positive},
 };
 use formats::archive::{self, Entry, Limits};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use model::counted;
 
@@ -245,6 +245,7 @@ fn entries(paths: &[PathBuf]) -> anyhow::Result<Vec<Entry>> {
 }
 
 fn learn_here(args: &LearnArgs, out: &Path) -> anyhow::Result<()> {
+    gateway::check_versioned_name("body model", &args.name)?;
     let set = ScanSet::read(entries(&args.files)?, &ScanOptions { metres_per_unit: args.unit })?;
     for warning in &set.warnings {
         eprintln!("warning: {warning}");
@@ -266,12 +267,14 @@ fn learn_here(args: &LearnArgs, out: &Path) -> anyhow::Result<()> {
 fn learn_there(args: &LearnArgs) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
     let uploads = pack::pack_where(&args.name, &args.files, &|name| body::is_scan_file(name))?;
-    let model: Value = client.post("/v1/body-models", &json!({ "name": args.name }))?;
+    let made = Request::default().with("name", "NAME", Some(args.name.as_str()));
+    let model: Value = client.post_request("/v1/body-models", &made)?;
     let id = model["id"].as_str().context("the answer has no id")?;
-    let mut request = json!({ "components": args.components });
-    if let Some(unit) = args.unit {
-        request["metres_per_unit"] = unit.into();
-    }
+    let request = Request::default().with("components", "--components", Some(args.components)).with(
+        "metres_per_unit",
+        "--unit",
+        args.unit,
+    );
     let path = format!("/v1/body-models/{id}");
     let called = format!("body model {}@{}", args.name, model["version"]);
     let run: Run = or_removed(&client, &path, &called, || {
@@ -279,7 +282,7 @@ fn learn_there(args: &LearnArgs) -> anyhow::Result<()> {
             println!("uploading {}", upload.name);
             client.put_file(&format!("{path}/files/{}", encode(&upload.name)), upload.file)?;
         }
-        client.post(&format!("{path}/build"), &request)
+        client.post_request(&format!("{path}/build"), &request)
     })?;
     println!("building {called} in run {}", run.id);
     if args.watch {
@@ -294,7 +297,15 @@ fn learn_there(args: &LearnArgs) -> anyhow::Result<()> {
 fn sample(args: &SampleArgs) -> anyhow::Result<()> {
     let model = open(&args.model, &args.server)?;
     let wanted = Wanted { stature_m: args.stature, mass_kg: args.mass, age_years: args.age, sex: args.sex };
-    let alpha = if args.alpha.is_empty() { model.alpha_for(&wanted)? } else { args.alpha.clone() };
+    let options = Request::default()
+        .with("stature_m", "--stature", args.stature)
+        .with("mass_kg", "--mass", args.mass)
+        .with("age_years", "--age", args.age);
+    let alpha = if args.alpha.is_empty() {
+        model.alpha_for(&wanted).map_err(|error| anyhow!(options.in_options(&error.to_string())))?
+    } else {
+        args.alpha.clone()
+    };
     if alpha.len() > model.num_components() || alpha.iter().any(|a| a.is_nan() || a.abs() > 6.0) {
         bail!(
             "--alpha: each number must be -6 to 6, at most {} of them; found {}",

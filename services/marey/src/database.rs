@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::{anyhow, ensure};
-use client::{Client, MotionDatabase, Run, ServerArgs, encode, numbers::positive, parameters::values};
+use client::{
+    Client, MotionDatabase, Request, Run, ServerArgs, encode, numbers::positive, parameters::values,
+};
 use jobs::motion_database::{Augment, Error};
 use model::{counted, shown};
-use serde_json::{Map, Value, json};
 
 use crate::{database_show, pack, watch, words::name};
 
@@ -190,15 +191,12 @@ fn augment(ways: &[Augmentation]) -> anyhow::Result<Augment> {
 
 impl BuildOptions {
     /// As the server takes it.
-    fn request(&self) -> Map<String, Value> {
-        let mut request = Map::new();
-        if let Some(shards) = self.shards {
-            request.insert("shards".into(), shards.into());
-        }
-        if let Some(metres) = self.bvh_metres_per_unit {
-            request.insert("bvh_metres_per_unit".into(), metres.into());
-        }
-        request
+    fn request(&self) -> Request {
+        Request::default().with("shards", "--shards", self.shards).with(
+            "bvh_metres_per_unit",
+            "--bvh-metres-per-unit",
+            self.bvh_metres_per_unit,
+        )
     }
 
     fn finish(&self, client: &Client, (database, run): (MotionDatabase, Run)) -> anyhow::Result<()> {
@@ -220,19 +218,22 @@ impl BuildOptions {
 pub fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Build(args) => {
-            let mut request = args.options.request();
-            if !args.augment.is_empty() {
-                request.insert("augment".into(), serde_json::to_value(augment(&args.augment)?)?);
-            }
+            let ways = (!args.augment.is_empty()).then(|| augment(&args.augment)).transpose()?;
+            let ways = ways.map(serde_json::to_value).transpose()?;
+            let request = args.options.request().with("augment", "--augment", ways);
             let client = Client::new(args.options.server.server()?);
-            let made = json!({ "name": args.name });
-            args.options.finish(&client, start(&client, &made, &args.files, request)?)
+            let made = Request::default().with("name", "NAME", Some(args.name.as_str()));
+            args.options.finish(&client, start(&client, &args.name, &made, &args.files, &request)?)
         }
         Command::Add(args) => {
             let client = Client::new(args.options.server.server()?);
             let base = find(&client, &args.which)?;
-            let made = json!({ "name": base.name, "base": args.which, "without": args.without });
-            args.options.finish(&client, start(&client, &made, &args.files, args.options.request())?)
+            let made = Request::default()
+                .with("name", "NAME", Some(base.name.as_str()))
+                .with("base", "DATABASE", Some(args.which.as_str()))
+                .with("without", "--without", Some(args.without.as_slice()));
+            let request = args.options.request();
+            args.options.finish(&client, start(&client, &base.name, &made, &args.files, &request)?)
         }
         Command::List(args) => list(&Client::new(args.server()?)),
         Command::Show(args) => {
@@ -260,24 +261,25 @@ fn find(client: &Client, which: &str) -> anyhow::Result<MotionDatabase> {
 
 /// Makes a database of recordings, and has it built.
 pub fn build(client: &Client, name: &str, files: &[PathBuf]) -> anyhow::Result<(MotionDatabase, Run)> {
-    start(client, &json!({ "name": name }), files, Map::new())
+    let made = Request::default().with("name", "NAME", Some(name));
+    start(client, name, &made, files, &Request::default())
 }
 
 /// Makes a database, uploads its files and has it built.
 fn start(
     client: &Client,
-    made: &Value,
+    name: &str,
+    made: &Request,
     files: &[PathBuf],
-    request: Map<String, Value>,
+    request: &Request,
 ) -> anyhow::Result<(MotionDatabase, Run)> {
-    let name = made["name"].as_str().unwrap_or_default();
     let uploads = if files.is_empty() { Vec::new() } else { pack::pack(name, files)? };
-    let database: MotionDatabase = client.post("/v1/motion-databases", made)?;
+    let database: MotionDatabase = client.post_request("/v1/motion-databases", made)?;
     let path = format!("/v1/motion-databases/{}", database.id);
     let called = format!("motion database {}@{}", database.name, database.version);
     let run = or_removed(client, &path, &called, || {
         send(client, &path, uploads)?;
-        client.post(&format!("{path}/build"), &Value::Object(request))
+        client.post_request(&format!("{path}/build"), request)
     })?;
     Ok((database, run))
 }
@@ -312,7 +314,12 @@ fn train(args: &TrainArgs) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
     let parameters = values(&args.set)?;
     let path = format!("/v1/motion-databases/{}/train", encode(&args.which));
-    let run: Run = client.post(&path, &json!({ "method": "gplvm", "parameters": parameters }))?;
+    let request = Request::default().with("method", "the method", Some("gplvm")).with(
+        "parameters",
+        "--set",
+        Some(parameters),
+    );
+    let run: Run = client.post_request(&path, &request)?;
     println!("training in run {}", run.id);
     if args.watch {
         watch::until_end(&client, &run.id)?;
@@ -350,6 +357,8 @@ mod tests {
     };
 
     use client::Server;
+
+    use serde_json::json;
 
     use super::*;
 

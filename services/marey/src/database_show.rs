@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use client::MotionDatabase;
+use model::shown_rate;
 use serde::Deserialize;
 
 use model::counted;
@@ -115,7 +116,7 @@ pub fn description(details: &Details) -> String {
                 "{}, {} at {} Hz",
                 counted(clips.unwrap_or_default(), "clip"),
                 counted(poses.unwrap_or_default(), "pose"),
-                contents.frame_rate_hz
+                shown_rate(contents.frame_rate_hz)
             ),
         );
         line("augmented", contents.augment.in_words());

@@ -36,8 +36,8 @@ pub struct CreateArgs {
     /// What the key allows: read, write, admin
     #[arg(long, value_delimiter = ',', default_value = "read,write")]
     scopes: Vec<Scope>,
-    /// Label to recognise the key by
-    #[arg(long, default_value = "")]
+    /// Label to recognise the key by: a line of at most 200 characters
+    #[arg(long, default_value = "", value_parser = access::key_label)]
     name: String,
     /// PostgreSQL, such as postgres://user:password@host/name
     #[arg(long, env = "MAREY_DATABASE_URL", hide_env_values = true)]

@@ -2,6 +2,8 @@
 //!
 //! The program is a library so that tests can start it as a process of its own.
 
+#[cfg(test)]
+mod alone;
 mod body;
 mod cli;
 mod cmu;

@@ -18,7 +18,7 @@ use tokio::time::{Interval, MissedTickBehavior, timeout_at};
 use tokio_util::sync::CancellationToken;
 
 use client::{
-    Latency, Server, ServerArgs,
+    Latency, Request, Server, ServerArgs,
     live::{Connection, Lost, Sender, frame_message},
     outputs,
     parameters::values,
@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let source = Source::open(&args.points, &args.chosen)?;
     let start = start(args, source.names())?;
     let server = args.server.server()?;
-    runtime()?.block_on(follow(args, &server, source, start))
+    runtime()?.block_on(follow(args, &server, source, &start))
 }
 
 /// That the poses and the state replace neither what is read nor each other.
@@ -93,27 +93,31 @@ fn check_outputs(args: &Args) -> anyhow::Result<()> {
     )
 }
 
-fn start(args: &Args, points: &[String]) -> anyhow::Result<Value> {
-    let mut start = json!({ "type": "start", "points": points });
-    if args.every {
-        start["delivery"] = "every".into();
-    }
-    if let Some(path) = &args.skeleton {
-        start["skeleton_asf"] = fs::read_to_string(path).with_context(|| path.display().to_string())?.into();
-    }
-    start["parameters"] = values(&args.parameters)?.into();
-    if let Some(path) = args.state_file.as_ref().filter(|path| path.exists()) {
+/// What the stream is to be, as options say it.
+fn start(args: &Args, points: &[String]) -> anyhow::Result<Request> {
+    let skeleton = args
+        .skeleton
+        .as_ref()
+        .map(|path| fs::read_to_string(path).with_context(|| path.display().to_string()));
+    let state = args.state_file.as_ref().filter(|path| path.exists()).map(|path| {
         let state = fs::read(path).with_context(|| path.display().to_string())?;
         ensure!(!state.is_empty(), "{} is empty, expected a live state", path.display());
-        start["state"] = BASE64_STANDARD.encode(state).into();
-    }
-    Ok(start)
+        Ok(BASE64_STANDARD.encode(state))
+    });
+    Ok(Request::default()
+        .with("points", "--points", Some(points))
+        .with("delivery", "--every", args.every.then_some("every"))
+        .with("skeleton_asf", "--skeleton", skeleton.transpose()?)
+        .with("parameters", "--set", Some(values(&args.parameters)?))
+        .with("state", "--state-file", state.transpose()?))
 }
 
 /// Follows the performer to the end of the frames, over as many connections as it takes.
-async fn follow(args: &Args, server: &Server, source: Source, mut start: Value) -> anyhow::Result<()> {
+async fn follow(args: &Args, server: &Server, source: Source, asked: &Request) -> anyhow::Result<()> {
+    let mut start = asked.to_json();
+    start["type"] = "start".into();
     let opened = Connection::open(server, &args.database, &start).await;
-    let mut connection = opened.map_err(|error| with_state_file(args, error))?;
+    let mut connection = opened.map_err(|error| with_state_file(args, in_options(asked, error)))?;
     // The state is of this version, whatever gets the name meanwhile.
     let database = connection.started["motion_database"].as_str().unwrap_or(&args.database).to_owned();
     let begin = Instant::now();
@@ -179,6 +183,11 @@ async fn reopen(server: &Server, database: &str, start: &Value) -> anyhow::Resul
             return Err(why.context(format!("the connection was lost and did not come back in {seconds} s")));
         }
     }
+}
+
+/// A refusal of what was asked for, in the words of the options; a connection that was lost stays one.
+fn in_options(asked: &Request, error: anyhow::Error) -> anyhow::Error {
+    if error.is::<Lost>() { error } else { anyhow!(asked.in_options(&format!("{error:#}"))) }
 }
 
 /// Says which file it is, if the state in it is what the server refuses.
@@ -337,18 +346,13 @@ async fn send(mut feed: Feed, mut sender: Sender, over: CancellationToken) -> an
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::alone::Alone;
     use clap::Parser;
     use futures::{SinkExt, StreamExt};
     use tokio_tungstenite::tungstenite::{
         Message,
         protocol::{CloseFrame, frame::coding::CloseCode},
     };
-
-    #[derive(Debug, clap::Parser)]
-    struct Alone {
-        #[command(flatten)]
-        args: Args,
-    }
 
     #[test]
     fn what_is_written_replaces_nothing_that_is_read() {
@@ -362,7 +366,7 @@ mod tests {
             let (output, state) = (path(output), path(state));
             let words = ["live", &points, "-d", "walks", "--skeleton", &skeleton];
             let words = words.into_iter().chain(["-o", &output, "--state-file", &state]);
-            check_outputs(&Alone::parse_from(words).args).map_err(|error| error.to_string())
+            check_outputs(&Alone::<Args>::parse_from(words).args).map_err(|error| error.to_string())
         };
         assert_eq!(check("poses.csv", "p.state"), Ok(()));
         for (output, state, expected) in [

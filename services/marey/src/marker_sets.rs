@@ -9,7 +9,7 @@ use anyhow::{Context, bail};
 use client::parameters;
 use formats::{PointsOptions, Read, session};
 use markers::{Fit, MarkerMap, fits, standard_names};
-use model::{Axis, PointTrajectories};
+use model::{Axis, PointTrajectories, shown_rate};
 use serde_json::{Map, Value};
 
 use model::counted;
@@ -72,7 +72,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         path.display(),
         counted(file.num_points(), "marker"),
         counted(file.num_frames(), "frame"),
-        file.frame_rate()
+        shown_rate(file.frame_rate())
     );
     let is_measured = is_measured(&file);
     if !is_measured {

@@ -1,14 +1,14 @@
 //! `marey run`.
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use body::Sex;
 use clap::builder::PossibleValuesParser;
 use client::{
-    Client, Run, ServerArgs,
+    Client, Request, Run, ServerArgs,
     numbers::positive,
     parameters::{pairs, values},
 };
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::{marker_sets, watch, words::name};
 
@@ -147,22 +147,62 @@ struct InverseKinematicsArgs {
     sex: Option<Sex>,
 }
 
-impl InverseKinematicsArgs {
-    /// The object of the request; none if nothing of it was said.
-    fn request(&self) -> Option<Value> {
-        let given = [
-            ("solver", self.solver.as_ref().map(|name| json!(name))),
-            ("steps", self.steps.map(Value::from)),
-            ("frame_rate", self.frame_rate.map(Value::from)),
-            ("stature_m", self.stature.map(Value::from)),
-            ("mass_kg", self.mass.map(Value::from)),
-            ("age_years", self.age.map(Value::from)),
-            ("sex", self.sex.as_ref().map(|sex| json!(sex))),
-        ];
-        let object: Map<String, Value> =
-            given.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect();
-        (!object.is_empty()).then_some(Value::Object(object))
+impl PointsArgs {
+    fn add_to(&self, request: Request) -> anyhow::Result<Request> {
+        let mut markers = marker_sets::request(&self.mapping)?;
+        if self.prefix.is_some() && !["marker_map", "marker_set"].iter().any(|way| markers.contains_key(*way))
+        {
+            bail!("--prefix needs a marker set or a file with a marker map: --map SET or --map FILE");
+        }
+        Ok(request
+            .with("points", "--points", several(&self.points))
+            .with("mapping", "--map", markers.remove("mapping"))
+            .with("marker_map", "--map", markers.remove("marker_map"))
+            .with("marker_set", "--map", markers.remove("marker_set"))
+            .with("marker_prefix", "--prefix", self.prefix.as_deref())
+            .with("up", "--up", self.up.as_deref()))
     }
+}
+
+impl SparseArgs {
+    fn add_to(&self, request: Request) -> Request {
+        request
+            .with("motion_database", "--database", self.database.as_deref())
+            .with("method", "--method", self.method.as_deref())
+            .with("window", "--window", self.window)
+            .with("neighbours", "--neighbours", self.neighbours)
+            .with("bvh_metres_per_unit", "--bvh-metres-per-unit", self.bvh_metres_per_unit)
+    }
+}
+
+impl CameraArgs {
+    fn add_to(&self, request: Request) -> anyhow::Result<Request> {
+        let files = pairs(&self.camera_files, "FILE=CAMERA", |name| name.into())?;
+        Ok(request
+            .with("cameras", "--cameras", several(&self.cameras))
+            .with("camera_files", "--camera", (!files.is_empty()).then_some(files))
+            .with("body_model", "--body-model", self.body_model.as_deref())
+            .with("background", "--background", self.background.as_deref())
+            .with("metres_per_unit", "--calibration-unit", self.calibration_unit))
+    }
+}
+
+impl InverseKinematicsArgs {
+    fn add_to(&self, request: Request) -> Request {
+        request
+            .with("inverse_kinematics.solver", "--solver", self.solver.as_deref())
+            .with("inverse_kinematics.steps", "--steps", self.steps)
+            .with("inverse_kinematics.frame_rate", "--frame-rate", self.frame_rate)
+            .with("inverse_kinematics.stature_m", "--stature", self.stature)
+            .with("inverse_kinematics.mass_kg", "--mass", self.mass)
+            .with("inverse_kinematics.age_years", "--age", self.age)
+            .with("inverse_kinematics.sex", "--sex", self.sex.as_ref().map(|sex| json!(sex)))
+    }
+}
+
+/// The names that were given, if any were.
+fn several(names: &[String]) -> Option<&[String]> {
+    (!names.is_empty()).then_some(names)
 }
 
 /// Runs `marey run`.
@@ -172,7 +212,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let session = client
         .find_session(&args.session)?
         .with_context(|| format!("there is no session {:?}; upload its files first", args.session))?;
-    let run: Run = client.post(&format!("/v1/sessions/{}/runs", session.id), &request)?;
+    let run: Run = client.post_request(&format!("/v1/sessions/{}/runs", session.id), &request)?;
     println!("run {}", run.id);
     if args.watch {
         watch::until_end(&client, &run.id)?;
@@ -191,44 +231,85 @@ fn warnings(client: &Client, run: &str) -> anyhow::Result<Vec<String>> {
     Ok(warnings.filter_map(Value::as_str).map(str::to_owned).collect())
 }
 
-fn request(args: &Args) -> anyhow::Result<Value> {
-    let mut request = json!({});
-    let named = [
-        ("motion_database", args.sparse.database.as_ref().map(|name| json!(name))),
-        ("kind", args.kind.as_ref().map(|kind| json!(kind))),
-        ("inverse_kinematics", args.inverse_kinematics.request()),
-        ("body_model", args.cameras.body_model.as_ref().map(|name| json!(name))),
-        ("cameras", (!args.cameras.cameras.is_empty()).then(|| json!(args.cameras.cameras))),
-        (
-            "camera_files",
-            (!args.cameras.camera_files.is_empty())
-                .then(|| {
-                    pairs(&args.cameras.camera_files, "FILE=CAMERA", |name| name.into()).map(Value::Object)
-                })
-                .transpose()?,
-        ),
-        ("background", args.cameras.background.as_ref().map(|kind| json!(kind))),
-        ("metres_per_unit", args.cameras.calibration_unit.map(Value::from)),
-        ("points", (!args.points.points.is_empty()).then(|| json!(args.points.points))),
-        ("marker_prefix", args.points.prefix.as_ref().map(|prefix| json!(prefix))),
-        ("up", args.points.up.as_ref().map(|axis| json!(axis))),
-        ("bvh_metres_per_unit", args.sparse.bvh_metres_per_unit.map(Value::from)),
-        ("method", args.sparse.method.as_ref().map(|m| json!(m))),
-        ("window", args.sparse.window.map(Value::from)),
-        ("neighbours", args.sparse.neighbours.map(Value::from)),
-        (
-            "parameters",
-            // a number or true where it reads as one, else a word
-            (!args.parameters.is_empty()).then(|| values(&args.parameters).map(Value::Object)).transpose()?,
-        ),
-    ];
-    for (name, value) in marker_sets::request(&args.points.mapping)? {
-        request[name] = value;
+/// The request that the options are.
+fn request(args: &Args) -> anyhow::Result<Request> {
+    // a number or true where it reads as one, else a word
+    let parameters = values(&args.parameters)?;
+    let request = Request::default().with("kind", "--kind", args.kind.as_deref()).with(
+        "parameters",
+        "--set",
+        (!parameters.is_empty()).then_some(parameters),
+    );
+    let request = args.sparse.add_to(args.points.add_to(request)?);
+    Ok(args.inverse_kinematics.add_to(args.cameras.add_to(request)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::alone::Alone;
+    use clap::{CommandFactory, Parser};
+
+    fn asked(words: &[&str]) -> anyhow::Result<Request> {
+        request(&Alone::<Args>::parse_from(["run", "take 3"].iter().chain(words)).args)
     }
-    for (name, value) in named {
-        if let Some(value) = value {
-            request[name] = value;
+
+    #[test]
+    fn a_request_has_what_was_given_and_nothing_else() {
+        assert_eq!(asked(&[]).unwrap().to_json(), json!({}));
+        let words = ["--stature", "1.8", "--sex", "male", "--set", "smooth=true", "--points", "head,root"];
+        let expected = json!({
+            "inverse_kinematics": {"stature_m": 1.8, "sex": "male"},
+            "parameters": {"smooth": true},
+            "points": ["head", "root"],
+        });
+        assert_eq!(asked(&words).unwrap().to_json(), expected);
+        let words = ["--camera", "a.mp4=cam01", "--map", "LWRA=left_wrist", "--database", "walks"];
+        let expected = json!({
+            "camera_files": {"a.mp4": "cam01"},
+            "mapping": {"LWRA": "left_wrist"},
+            "motion_database": "walks",
+        });
+        assert_eq!(asked(&words).unwrap().to_json(), expected);
+    }
+
+    #[test]
+    fn refusals_name_the_options() {
+        let request = asked(&["--stature", "180", "--set", "particles=5000"]).unwrap();
+        for (said, expected) in [
+            (
+                "inverse_kinematics.stature_m is 180 m, expected 1 to 2.4 m",
+                "--stature is 180 m, expected 1 to 2.4 m",
+            ),
+            (
+                "parameters.particles is 5000, expected 2 to 2000",
+                "--set particles is 5000, expected 2 to 2000",
+            ),
+            ("metres_per_unit is 0, expected 1", "--calibration-unit is 0, expected 1"),
+        ] {
+            assert_eq!(request.in_options(said), expected);
         }
     }
-    Ok(request)
+
+    #[test]
+    fn every_field_of_a_run_names_an_option_that_there_is() {
+        let command = Alone::<Args>::command();
+        let request = asked(&[]).unwrap();
+        for kind in gateway::session_run_fields() {
+            let shown = request.in_options(&format!("they have: {kind}"));
+            let option = shown.trim_start_matches("they have: ");
+            for option in option.split(", ") {
+                let name =
+                    option.strip_prefix("--").unwrap_or_else(|| panic!("{kind} has no option: {shown}"));
+                assert!(command.get_arguments().any(|known| known.get_long() == Some(name)), "{option}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_prefix_needs_names_to_go_before() {
+        let refused = asked(&["--prefix", "Anna:"]).unwrap_err().to_string();
+        assert!(refused.starts_with("--prefix needs a marker set"), "{refused}");
+        asked(&["--prefix", "Anna:", "--map", "plug-in-gait"]).unwrap();
+    }
 }

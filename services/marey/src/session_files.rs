@@ -65,7 +65,8 @@ fn from_folder(folder: &Path) -> anyhow::Result<Vec<SessionFile>> {
     let mut pictures = Vec::new();
     pack::collect_where(folder, folder, &FileRole::is_picture_file, &mut pictures)?;
     if pictures.is_empty() {
-        bail!("{} holds no pictures (.png, .jpg); name the files themselves", folder.display());
+        let endings = FileRole::picture_endings();
+        bail!("{} holds no pictures ({endings}); name the files themselves", folder.display());
     }
     pictures.sort_by(|a, b| a.1.cmp(&b.1));
     let role = role_of(folder);

@@ -20,8 +20,9 @@ use crate::{
 /// performer's skeleton, .asf or .bvh, is optional: without one, it is fitted to the points. A true motion (.amc, .bvh), if
 /// there is one, serves to measure the error.
 ///
-/// For cameras: a calibration (.toml, .json, .yml, .xml, .qca.txt), and for each camera a video, or pictures or masks in a
-/// folder or archive, named after the camera; pictures of the empty scene are called cam01.plate.png or lie in a folder plates/.
+/// For cameras: a calibration (.toml, .json, .yml, .yaml, .xml, .qca.txt), and for each camera a video (.mp4, .mov, .m4v, .avi,
+/// .mkv, .webm), or pictures or masks in a folder or archive, named after the camera; pictures of the empty scene are called
+/// cam01.plate.png or lie in a folder plates/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey upload \"take 3\" points.csv skeleton.asf
@@ -123,14 +124,30 @@ pub fn send(
 mod tests {
     use std::fs;
 
-    use clap::Parser;
+    use clap::{CommandFactory, Parser};
 
     use super::*;
+    use crate::alone::Alone;
 
-    #[derive(Debug, Parser)]
-    struct Alone {
-        #[command(flatten)]
-        args: Args,
+    #[test]
+    fn the_help_names_all_roles_and_the_endings_of_their_files() {
+        let help = Alone::<Args>::command().render_long_help().to_string();
+        let roles = [
+            FileRole::Skeleton,
+            FileRole::ControlPoints,
+            FileRole::GroundTruth,
+            FileRole::Calibration,
+            FileRole::Video,
+        ];
+        for role in roles {
+            let endings = role.endings().replace(" or ", ", ");
+            for ending in endings.split(", ") {
+                assert!(help.contains(ending), "{role} {ending}");
+            }
+        }
+        for role in FileRole::of_sessions() {
+            assert!(help.contains(role.as_str()), "{role}");
+        }
     }
 
     #[test]
@@ -141,7 +158,7 @@ mod tests {
             fs::write(folder.path().join(name), "x").unwrap();
         }
         let check = |words: &[&str]| {
-            let args = Alone::parse_from(["upload", "s"].iter().chain(words)).args;
+            let args = Alone::<Args>::parse_from(["upload", "s"].iter().chain(words)).args;
             // no server is there: what is refused is refused before one is asked
             with_roles(session_files::gather(&args.files)?, &args).map(|files| files.len())
         };

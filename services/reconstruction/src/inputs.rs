@@ -138,7 +138,7 @@ pub(crate) fn measured_points(
     warnings: &mut Vec<String>,
 ) -> Result<(String, PointTrajectories), InputError> {
     let role = FileRole::ControlPoints;
-    let file = at_most_one(files, role)?.ok_or_else(|| FileError::Count { role, names: Vec::new() })?;
+    let file = at_most_one(files, role)?.ok_or(FileError::Missing { role })?;
     Ok((file.name.clone(), read_points(file, reading, warnings)?))
 }
 
@@ -161,7 +161,7 @@ fn at_most_one(files: &[NamedBytes], role: FileRole) -> Result<Option<&NamedByte
     let found: Vec<&NamedBytes> = files.iter().filter(|f| f.role == role).collect();
     if found.len() > 1 {
         let names = found.iter().map(|file| file.name.clone()).collect();
-        return Err(FileError::Count { role, names }.into());
+        return Err(FileError::Several { role, names }.into());
     }
     Ok(found.first().copied())
 }

@@ -104,11 +104,13 @@ fn first_size(sources: &[Source], bytes: &Bytes, max_bytes: u64) -> Result<Optio
 /// The only calibration of a session.
 fn calibration_file(files: &[InputFile]) -> Result<&InputFile, InputError> {
     let found: Vec<&InputFile> = files.iter().filter(|file| file.role == FileRole::Calibration).collect();
+    let role = FileRole::Calibration;
     match found[..] {
         [only] => Ok(only),
+        [] => Err(FileError::Missing { role }.into()),
         _ => {
             let names = found.iter().map(|file| file.name.clone()).collect();
-            Err(FileError::Count { role: FileRole::Calibration, names }.into())
+            Err(FileError::Several { role, names }.into())
         }
     }
 }

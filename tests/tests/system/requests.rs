@@ -334,20 +334,23 @@ fn a_body_that_nobody_has_is_refused_before_there_is_a_run() -> Result<()> {
     let api = system.project("p")?;
     let session = api.session("s", &[POINTS])?;
     for (options, expected) in [
-        (json!({"stature_m": 0}), "inverse_kinematics.stature_m is 0, expected 1 to 2.4"),
-        (json!({"stature_m": 178}), "inverse_kinematics.stature_m is 178, expected 1 to 2.4"),
-        (json!({"mass_kg": -70}), "inverse_kinematics.mass_kg is -70, expected 20 to 250"),
-        (json!({"age_years": 400}), "inverse_kinematics.age_years is 400, expected 0 to 120"),
+        (json!({"stature_m": 0}), "inverse_kinematics.stature_m is 0 m, expected 1 to 2.4 m"),
+        (json!({"stature_m": 178}), "inverse_kinematics.stature_m is 178 m, expected 1 to 2.4 m"),
+        (json!({"mass_kg": -70}), "inverse_kinematics.mass_kg is -70 kg, expected 20 to 250 kg"),
+        (json!({"age_years": 400}), "inverse_kinematics.age_years is 400 years, expected 0 to 120 years"),
         (
             json!({"alpha": [0, 99]}),
             "inverse_kinematics.alpha[1] is 99, expected -6 to 6 standard deviations",
         ),
-        (json!({"stature_m": 1e308}), "inverse_kinematics.stature_m is 1e308, expected 1 to 2.4"),
+        (json!({"stature_m": 1e308}), "inverse_kinematics.stature_m is 1e308 m, expected 1 to 2.4 m"),
         (
             json!({"alpha": [-1e308]}),
             "inverse_kinematics.alpha[0] is -1e308, expected -6 to 6 standard deviations",
         ),
-        (json!({"frame_rate": 1e308}), "inverse_kinematics.frame_rate is 1e308, expected 1 to 1000"),
+        (
+            json!({"frame_rate": 1e308}),
+            "inverse_kinematics.frame_rate is 1e308, expected 1 to 1000 frames a second",
+        ),
         (json!({"alpha": [0], "mass_kg": 70}), "inverse_kinematics.alpha is given beside measurements"),
         (json!({"alpha": vec![0; 1000]}), "inverse_kinematics.alpha has 1000 numbers, expected at most"),
     ] {

@@ -15,7 +15,7 @@ use client::{
     outputs,
     parameters::values,
 };
-use model::counted;
+use model::{counted, shown_rate};
 use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::json;
@@ -124,7 +124,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     println!(
         "{} at {} frames/s for {} s, {} points, {} poses in the database",
         counted(args.streams, "stream"),
-        args.fps,
+        shown_rate(args.fps),
         args.seconds,
         args.points,
         built.num_poses.unwrap_or_default()

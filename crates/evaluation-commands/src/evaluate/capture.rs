@@ -8,7 +8,7 @@ use std::{
 
 use anyhow::{Context, bail};
 use evaluation::Body;
-use formats::{calibration, image_files};
+use formats::{FileRole, calibration, image_files};
 use model::{Camera, Image, Mesh, Silhouette, counted};
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -134,8 +134,9 @@ fn calibration(folder: &Path) -> anyhow::Result<Vec<Camera>> {
     files.retain(|file| file.file_stem().is_some_and(|stem| stem.to_string_lossy().starts_with("calib")));
     let Some(file) = files.first() else {
         bail!(
-            "found no calibration in {}, expected calibration.json, .yml, .toml or .qca.txt",
-            folder.display()
+            "found no calibration in {}, expected a file called calibration that ends in {}",
+            folder.display(),
+            FileRole::Calibration.endings()
         );
     };
     let name = file.file_name().unwrap_or_default().to_string_lossy();

@@ -18,8 +18,7 @@ pub struct File {
 pub fn only(files: &[File], role: FileRole) -> anyhow::Result<Option<&File>> {
     let found: Vec<&File> = files.iter().filter(|file| file.role == role).collect();
     if found.len() > 1 {
-        let names = found.iter().map(|file| file.name.as_str()).collect::<Vec<_>>().join(", ");
-        bail!("the session has {} ({names}); keep one", role.counted(found.len()));
+        bail!(role.keep_one(&found.iter().map(|file| file.name.as_str()).collect::<Vec<_>>()));
     }
     Ok(found.first().copied())
 }

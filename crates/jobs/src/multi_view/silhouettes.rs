@@ -1,6 +1,7 @@
 //! The silhouettes of one camera: the job that makes them, and what it leaves for those after it.
 
 use background::CameraQuality;
+use model::shown_rate;
 use multi_view::{CameraRecord, Parameters};
 use queue::{Artefact, Job, JobError};
 use serde::{Deserialize, Serialize};
@@ -205,9 +206,11 @@ pub fn frame_rate(cameras: &[CameraReport], warnings: &mut Vec<String>) -> Optio
     let mut known = cameras.iter().filter_map(|camera| Some((&camera.camera.name, camera.frame_rate?)));
     let (first, rate) = known.next()?;
     if let Some((other, found)) = known.find(|(_, found)| (found - rate).abs() > 0.01 * rate) {
+        let taken = shown_rate(rate);
         warnings.push(format!(
-            "camera {other} has {found} frames a second, camera {first} {rate}: all are taken to have {rate}; convert \
-             them to one rate"
+            "camera {other} has {} frames a second, camera {first} {taken}: all are taken to have {taken}; convert \
+             them to one rate",
+            shown_rate(found)
         ));
     }
     Some(rate)

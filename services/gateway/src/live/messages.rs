@@ -6,6 +6,8 @@ use proto::v1::{self, LiveDelivery, live_response};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use crate::{error::Error, json};
+
 /// Bytes before the coordinates of a binary frame: number and time.
 const FRAME_HEADER: usize = 16;
 /// Bit of a binary pose's flags: there is a pose.
@@ -14,11 +16,25 @@ const HAS_POSE: u32 = 1;
 const IS_STARTING: u32 = 2;
 
 /// What a client says. All but the first message are frames and, last, an end.
-#[derive(Debug, Deserialize)]
-#[serde(tag = "type", rename_all = "snake_case")]
+#[derive(Debug)]
 pub(super) enum FromClient {
     Start(Start),
     Frame(Frame),
+    End,
+}
+
+/// What every message begins with.
+#[derive(Debug, Deserialize)]
+struct Head {
+    #[serde(rename = "type")]
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Kind {
+    Start,
+    Frame,
     End,
 }
 
@@ -113,9 +129,30 @@ pub(super) struct Nonsense {
 
 /// Reads a text message.
 pub(super) fn read_text(text: &str) -> Result<FromClient, Nonsense> {
-    serde_json::from_str(text).map_err(|error| {
+    parse(text).map_err(|error| {
         let frame = serde_json::from_str::<Value>(text).ok().and_then(|value| value["frame"].as_u64());
-        Nonsense { frame, what: format!("a message can't be read: {error}") }
+        let what = match frame {
+            Some(number) => format!("frame {number}: {error}"),
+            None => error.to_string(),
+        };
+        Nonsense { frame, what }
+    })
+}
+
+/// A message, in the words of requests where it is none.
+fn parse(text: &str) -> Result<FromClient, Error> {
+    let mut message = json::parse("the message", text.as_bytes())?;
+    if !message.is_object() {
+        return Err(Error::Unprocessable("the message is no object, expected {\"type\": …}".into()));
+    }
+    let head: Head = json::read(&message)?;
+    if let Some(fields) = message.as_object_mut() {
+        fields.remove("type");
+    }
+    Ok(match head.kind {
+        Kind::Start => FromClient::Start(json::read(&message)?),
+        Kind::Frame => FromClient::Frame(json::read(&message)?),
+        Kind::End => FromClient::End,
     })
 }
 
@@ -290,6 +327,41 @@ mod tests {
             assert_eq!(read_binary(&vec![0; length]).unwrap_err().frame, frame, "{length} bytes");
         }
         assert_eq!(read_binary(&[0; 40]).unwrap().positions_m, [0.0; 6]);
+    }
+
+    #[test]
+    fn nonsense_is_named_by_field_in_plain_words() {
+        for (text, expected) in [
+            (r#"{"type":"dance","frame":15}"#, "frame 15: type is \"dance\", expected start, frame or end"),
+            (r#"{"frame":15}"#, "frame 15: type is missing"),
+            ("[1]", "the message is no object, expected {\"type\": …}"),
+            (
+                r#"{"type":"frame","frame":"a","points":[]}"#,
+                "frame is \"a\", expected a whole number of 0 or more",
+            ),
+            (
+                r#"{"type":"frame","frame":13,"points":[[1,2,"x"]]}"#,
+                "frame 13: points[0][2] is \"x\", expected a number",
+            ),
+            (
+                r#"{"type":"frame","frame":12,"points":[null,[1,2]]}"#,
+                "frame 12: points[1] is an array of 2, expected one of 3",
+            ),
+            (
+                r#"{"type":"frame","frame":14,"points":[],"more":1}"#,
+                "frame 14: more is not known; there are: frame, time, points, sigmas",
+            ),
+            (r#"{"type":"start","points":"head"}"#, "points is \"head\", expected an array"),
+            (
+                r#"{"type":"start","points":[],"delivery":"all"}"#,
+                "delivery is \"all\", expected latest or every",
+            ),
+            (r#"{"type":"start"}"#, "points is missing"),
+        ] {
+            assert_eq!(read_text(text).unwrap_err().what, expected, "{text}");
+        }
+        assert!(read_text("{").unwrap_err().what.starts_with("the message is not JSON: "));
+        assert!(matches!(read_text(r#"{"type":"end","frame":1}"#), Ok(FromClient::End)));
     }
 
     #[test]

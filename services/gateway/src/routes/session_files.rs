@@ -28,10 +28,8 @@ use crate::{
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct PutQuery {
-    /// guessed from the name when left out: `.asf` skeleton; `.csv`, `.trc`, `.c3d` control points; `.amc`, `.bvh`
-    /// ground truth; `.toml`, `.json`, `.yml`, `.xml`, `.qca.txt` calibration; `.mp4`, `.mov`, `.m4v`,
-    /// `.avi`, `.mkv`, `.webm` video; `.png`, `.jpg` plate; archives masks, or images or plates
-    /// if their name says so
+    /// guessed from the name when left out: `.bvh` counts as ground truth, archives as masks, or as images or plates if
+    /// their name says so
     #[param(schema_with = files::session_role_schema)]
     role: Option<FileRole>,
 }

@@ -95,7 +95,7 @@ impl CameraFields {
         let mut parameters: Parameters = json::read_parameters(self.parameters.clone())?;
         if let Some(kind) = &self.background {
             if self.parameters.get("background").is_some_and(|given| !given["model"].is_null()) {
-                let what = "background is given twice: as a field and in parameters";
+                let what = "background is given twice: here and as parameters.background";
                 return Err(Error::Unprocessable(what.into()));
             }
             parameters.background.model = serde_json::from_value(kind.as_str().into()).map_err(|_| {
@@ -159,21 +159,21 @@ fn check_named_files(named: &BTreeMap<String, String>, files: &[InputFile]) -> R
 
 /// Refuses a session without a calibration, or without anything that cameras saw.
 fn check_files(files: &[InputFile]) -> Result<()> {
-    let count = |role: FileRole| files.iter().filter(|file| file.role == role).count();
-    match count(FileRole::Calibration) {
-        1 => {}
-        0 => {
-            return Err(Error::Unprocessable(
-                "the session has no calibration; upload a .toml, .json, .yml, .xml or .qca.txt file of its cameras first".into(),
-            ));
-        }
-        found => {
+    let names = |role: FileRole| {
+        let with_role = files.iter().filter(move |file| file.role == role);
+        with_role.map(|file| file.name.as_str()).collect::<Vec<_>>()
+    };
+    match names(FileRole::Calibration)[..] {
+        [_] => {}
+        [] => {
             return Err(Error::Unprocessable(format!(
-                "the session has {found} calibration files, expected one"
+                "the session has no calibration; upload a {} file of its cameras first",
+                FileRole::Calibration.endings()
             )));
         }
+        ref several => return Err(Error::Unprocessable(FileRole::Calibration.keep_one(several))),
     }
-    if [FileRole::Video, FileRole::Images, FileRole::Masks].into_iter().all(|role| count(role) == 0) {
+    if [FileRole::Video, FileRole::Images, FileRole::Masks].into_iter().all(|role| names(role).is_empty()) {
         return Err(Error::Unprocessable(
             "the session has no video, images or masks; upload what the cameras saw first".into(),
         ));

@@ -153,7 +153,10 @@ impl InverseKinematicsRequest {
             return refuse(format!("inverse_kinematics.steps is {steps}, expected 1 to {}", STEPS.0));
         }
         if let Some(rate) = self.frame_rate.filter(|rate| !FRAME_RATES.contains(rate)) {
-            return refuse(format!("inverse_kinematics.frame_rate is {}, expected 1 to 1000", shown(rate)));
+            let found = shown(rate);
+            return refuse(format!(
+                "inverse_kinematics.frame_rate is {found}, expected 1 to 1000 frames a second"
+            ));
         }
         self.check_body()
     }
@@ -195,8 +198,8 @@ impl InverseKinematicsRequest {
         let Some(name) = &self.solver else { return Ok(None) };
         serde_json::from_value(name.as_str().into()).map(Some).map_err(|_| {
             Error::Unprocessable(format!(
-                "inverse_kinematics.solver is {name:?}, expected plain, priority, image-constrained, extended, image-first or \
-                 reach-then-image-then-posture"
+                "inverse_kinematics.solver is {name:?}, expected plain, priority, image-constrained, extended, \
+                 image-first or reach-then-image-then-posture"
             ))
         })
     }
@@ -209,8 +212,8 @@ impl InverseKinematicsRequest {
             None if has_cameras => Ok(Method::ImageConstrained),
             None => Ok(Method::Priority),
             Some(solver) if solver.uses_images() && !has_cameras => Err(Error::Unprocessable(format!(
-                "inverse_kinematics.solver is {:?}, which needs silhouettes; upload a calibration and what the cameras saw, or choose plain or \
-                 priority",
+                "inverse_kinematics.solver is {:?}, which needs silhouettes; upload a calibration and what the cameras \
+                 saw, or choose plain or priority",
                 self.solver.as_deref().unwrap_or_default()
             ))),
             Some(solver) => Ok(solver),

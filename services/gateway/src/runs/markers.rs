@@ -1,6 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use jobs::PointChoice;
+use model::counted;
 use serde::Deserialize;
 use utoipa::ToSchema;
 
@@ -52,7 +53,7 @@ impl MarkerFields {
             return Ok(());
         }
         if !POINTS.contains(&self.points.len()) {
-            return refuse(format!("names in points: {}, expected 2 to 16", self.points.len()));
+            return refuse(format!("points has {}, expected 2 to 16", counted(self.points.len(), "name")));
         }
         let mut seen = BTreeSet::new();
         match self.points.iter().find(|name| !seen.insert(*name)) {

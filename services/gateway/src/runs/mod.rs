@@ -31,6 +31,11 @@ const KINDS: &[Kind] = &[
     Kind::new::<inverse_kinematics::InverseKinematicsRun>(),
 ];
 
+/// The fields that requests for runs on sessions have, of all kinds.
+pub fn session_run_fields() -> std::collections::BTreeSet<String> {
+    KINDS.iter().flat_map(|kind| (kind.object)().properties.into_keys()).collect()
+}
+
 /// The kinds of runs on sessions, as requests name them.
 pub fn session_run_kinds() -> impl Iterator<Item = &'static str> {
     KINDS.iter().map(|kind| kind.name)

@@ -40,7 +40,6 @@ impl SessionRun for MultiViewRun {
         json!({
             "kind": "multi-view",
             "body_model": "shipped",
-
             "background": "auto",
             "parameters": {"chunk_frames": 150, "particles": 25},
         })

@@ -126,7 +126,7 @@ impl SparseRun {
                 && given.insert(name.into(), value).is_some()
             {
                 return Err(Error::Unprocessable(format!(
-                    "{name} is given twice: as a field and in parameters"
+                    "{name} is given twice: here and as parameters.{name}"
                 )));
             }
         }

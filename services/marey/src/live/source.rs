@@ -4,7 +4,7 @@ use std::{io::BufRead, path::Path, time::Instant};
 
 use anyhow::{Context, ensure};
 use formats::session::{self, Options};
-use model::{PointTrajectories, Samples, shown};
+use model::{PointTrajectories, Samples, shown, shown_rate};
 use nalgebra::Vector3;
 use tokio::sync::mpsc;
 
@@ -90,7 +90,7 @@ impl Source {
             step >= 1.0 && (ratio - step).abs() < 0.01 * step,
             "{} has {} frames a second, expected 60 or a multiple of it",
             name(),
-            trajectories.frame_rate()
+            shown_rate(trajectories.frame_rate())
         );
         let names = if chosen.is_empty() { trajectories.names().to_vec() } else { chosen.to_vec() };
         let column = |n: &String| {

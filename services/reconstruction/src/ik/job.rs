@@ -12,7 +12,7 @@ use jobs::{
     multi_view::{CameraClips, CameraReport, frame_rate},
 };
 use kinematics::ControlPoint;
-use model::counted;
+use model::{counted, shown, shown_rate};
 use nalgebra::Vector3;
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::compute;
@@ -151,10 +151,11 @@ impl IkHandler {
                 let seen = end.saturating_sub(first);
                 if seen.abs_diff(frames.count) > 1 {
                     warnings.push(format!(
-                        "the cameras have {}, the measured points {} at the same {rate} frames a second: only those that both have \
-                         are used, and both are assumed to begin at the same moment",
+                        "the cameras have {}, the measured points {} at the same {} frames a second: only those \
+                         that both have are used, and both are assumed to begin at the same moment",
                         counted(seen, "frame"),
-                        frames.count
+                        frames.count,
+                        shown_rate(rate)
                     ));
                 }
                 frames.count = frames.count.min(seen);
@@ -202,5 +203,5 @@ fn check(request: &SolveInverseKinematics) -> Result<(), InputError> {
 }
 
 fn out_of_range(field: &'static str, found: f64, expected: &'static str) -> InputError {
-    InputError::OutOfRange { field, found: found.to_string(), expected }
+    InputError::OutOfRange { field, found: shown(found), expected }
 }
