@@ -30,9 +30,20 @@ impl ControlPoints {
         }
     }
 
-    /// The points.
-    pub fn points(&self) -> &PointSet {
-        &self.points
+    /// Variances of the measured coordinates, metres², packed into `out`; returns their number (three a measured point).
+    pub fn variances(&self, measured: &[Option<Measurement>], out: &mut [f64]) -> usize {
+        let mut rows = 0;
+        for m in measured.iter().flatten() {
+            out[rows..rows + 3].fill(m.sigma * m.sigma);
+            rows += 3;
+        }
+        rows
+    }
+
+    /// The coordinates that move each measured point, in rising order.
+    pub fn moved_by(&self, measured: &[Option<Measurement>]) -> impl Iterator<Item = &[usize]> + Clone {
+        let points = measured.iter().enumerate();
+        points.filter_map(|(point, m)| m.as_ref().map(|_| self.points.moved_by(point)))
     }
 
     /// Residuals `c − f(x)` of the measured points, metres, packed into `out`; returns their number of rows (three a

@@ -1,12 +1,15 @@
 use dense::{PAD, ROWS, padded};
-use kinematics::Kinematics;
 
-use crate::{ControlPoints, GaussianPrior, Measurement};
+use crate::GaussianPrior;
 
-/// The measured points to first order about some coordinates, and what the prior makes of it: all that steps of any
-/// damping from there have in common.
+/// Rows of a block: one vector in space.
+pub const BLOCK: usize = 3;
+
+/// The residuals to first order about some coordinates, and what the prior makes of it: all that steps of any damping
+/// from there have in common.
 ///
-/// Most of J is zero: a point is moved by the coordinates of its own chain only.
+/// Residuals come in blocks of three rows that are moved by the same coordinates; most of J is zero. A residual of fewer
+/// rows leaves the others of its block zero, with variance 1: they then add nothing to energy and determinant.
 #[derive(Debug, Clone)]
 pub struct Linearisation {
     /// J, `[rows, dofs]`
@@ -15,8 +18,8 @@ pub struct Linearisation {
     spread: Vec<f64>,
     /// lower triangle of JΣJᵀ, `[rows, rows]`
     products: Vec<f64>,
-    /// which measured points the rows belong to, three rows each
-    points: Vec<usize>,
+    /// how many rows there are, of the room for them
+    rows: usize,
     dofs: usize,
     /// `[W⁻¹ + share · JΣJᵀ | right sides]`
     system: Vec<f64>,
@@ -25,56 +28,46 @@ pub struct Linearisation {
 }
 
 impl Linearisation {
-    /// Memory for `points` control points and `dofs` coordinates.
-    pub fn new(points: usize, dofs: usize) -> Self {
-        let rows = 3 * points;
+    /// Memory for `blocks` blocks of residuals and `dofs` coordinates.
+    pub fn new(blocks: usize, dofs: usize) -> Self {
+        let rows = BLOCK * blocks;
         let wide = dense::stride(padded(rows, PAD) + padded(dofs, PAD));
         Self {
             jacobian: vec![0.0; rows * dofs],
             spread: vec![0.0; rows * dofs],
             products: vec![0.0; rows * rows],
-            points: Vec::with_capacity(points),
+            rows: 0,
             dofs,
             system: vec![0.0; padded(rows, ROWS) * wide],
             multipliers: vec![0.0; rows],
         }
     }
 
-    /// Number of rows: three a measured point.
-    pub fn num_rows(&self) -> usize {
-        3 * self.points.len()
+    /// J, row-major, shape `[rows, dofs]`, to be written before [`Self::update`].
+    pub fn jacobian_mut(&mut self) -> &mut [f64] {
+        &mut self.jacobian
     }
 
-    /// Linearises at the coordinates last given to [`ControlPoints::residuals`].
-    pub fn update(
-        &mut self,
-        kinematics: &Kinematics,
-        likelihood: &mut ControlPoints,
-        measured: &[Option<Measurement>],
-        prior: &GaussianPrior,
-    ) {
+    /// Takes J as it was written. `moved_by` gives, block after block, the coordinates that move it, in rising order.
+    pub fn update<'a>(&mut self, prior: &GaussianPrior, moved_by: impl Iterator<Item = &'a [usize]> + Clone) {
         let dofs = self.dofs;
-        likelihood.jacobian(kinematics, measured, &mut self.jacobian);
-        self.points.clear();
-        self.points.extend((0..measured.len()).filter(|&p| measured[p].is_some()));
-        let rows = 3 * self.points.len();
-        let block = 3 * dofs;
-        let chain = |point: usize| likelihood.points().moved_by(point);
+        let block = BLOCK * dofs;
+        self.rows = 0;
         let blocks = self.jacobian.chunks_exact(block).zip(self.spread.chunks_exact_mut(block));
-        for (&point, (j, spread)) in self.points.iter().zip(blocks) {
-            dense::selected_product(j, chain(point), &prior.covariance, dofs, spread);
+        for (moved_by, (j, spread)) in moved_by.clone().zip(blocks) {
+            dense::selected_product(j, moved_by, &prior.covariance, dofs, spread);
+            self.rows += BLOCK;
         }
-        for (k, &point) in self.points.iter().enumerate() {
-            let j = &self.jacobian[k * block..][..block];
-            for row in 3 * k..rows {
+        for (k, (moved_by, j)) in moved_by.zip(self.jacobian.chunks_exact(block)).enumerate() {
+            for row in BLOCK * k..self.rows {
                 let spread = &self.spread[row * dofs..][..dofs];
-                let mut sums = [0.0; 3];
-                for &dof in chain(point) {
-                    for (sum, i) in sums.iter_mut().zip(0..3) {
+                let mut sums = [0.0; BLOCK];
+                for &dof in moved_by {
+                    for (sum, i) in sums.iter_mut().zip(0..BLOCK) {
                         *sum += spread[dof] * j[i * dofs + dof];
                     }
                 }
-                self.products[row * rows + 3 * k..][..3].copy_from_slice(&sums);
+                self.products[row * self.rows + BLOCK * k..][..BLOCK].copy_from_slice(&sums);
             }
         }
     }
@@ -82,7 +75,7 @@ impl Linearisation {
     /// Fills the system of a step, `W⁻¹ + share · JΣJᵀ`, with room for `columns` right sides; returns the distance of its
     /// rows and the column at which the right sides begin.
     fn fill(&mut self, variances: &[f64], share: f64, columns: usize) -> (usize, usize) {
-        let rows = self.num_rows();
+        let rows = self.rows;
         let right = padded(rows, PAD);
         let stride = dense::stride(right + padded(columns, PAD));
         let system = &mut self.system[..padded(rows, ROWS) * stride];
@@ -111,7 +104,7 @@ impl Linearisation {
         [x, z]: [&[f64]; 2],
         [trial_x, trial_z]: [&mut [f64]; 2],
     ) -> Option<f64> {
-        let (rows, dofs) = (self.num_rows(), self.dofs);
+        let (rows, dofs) = (self.rows, self.dofs);
         let (stride, right) = self.fill(variances, share, 1);
         let size = padded(rows, ROWS);
         let system = &mut self.system[..size * stride];
@@ -144,7 +137,7 @@ impl Linearisation {
 
     /// Variance of every coordinate given the measurements, `diag(Σ − ΣJᵀ(JΣJᵀ + W⁻¹)⁻¹JΣ)`, into `out`.
     pub fn variances(&mut self, prior: &GaussianPrior, variances: &[f64], out: &mut [f64]) {
-        let (rows, dofs) = (self.num_rows(), self.dofs);
+        let (rows, dofs) = (self.rows, self.dofs);
         for (d, out) in out.iter_mut().enumerate() {
             *out = prior.covariance[d * dofs + d];
         }

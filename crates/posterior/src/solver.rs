@@ -1,6 +1,6 @@
 use kinematics::Kinematics;
 
-use crate::linearisation::Linearisation;
+use crate::linearisation::{BLOCK, Linearisation};
 use crate::{ControlPoints, GaussianPrior, Measurement};
 
 /// When the solver stops.
@@ -66,7 +66,7 @@ pub struct MapSolver {
 impl MapSolver {
     /// Memory for `points` control points and `dofs` coordinates.
     pub fn new(points: usize, dofs: usize) -> Self {
-        let rows = 3 * points;
+        let rows = BLOCK * points;
         Self {
             linearisation: Linearisation::new(points, dofs),
             residuals: vec![0.0; rows],
@@ -95,7 +95,7 @@ impl MapSolver {
     ) -> Solution {
         self.x.copy_from_slice(&prior.mean);
         self.z.fill(0.0);
-        let rows = self.set_variances(measured);
+        let rows = likelihood.variances(measured, &mut self.variances);
         let (_, mut data_energy) = likelihood.residuals(kinematics, &self.x, measured, &mut self.residuals);
         let mut prior_energy = 0.0;
         let mut damping = 0.0;
@@ -105,7 +105,7 @@ impl MapSolver {
         while steps < parameters.max_steps && rows > 0 {
             steps += 1;
             if is_new_point {
-                self.linearisation.update(kinematics, likelihood, measured, prior);
+                self.linearise(kinematics, likelihood, measured, prior);
                 is_new_point = false;
             }
             let share = 1.0 / (1.0 + damping);
@@ -147,14 +147,16 @@ impl MapSolver {
         Solution { steps, likelihood_energy: data_energy, prior_energy, residual_m, log_determinant }
     }
 
-    /// Variances of the measured coordinates; returns their number.
-    fn set_variances(&mut self, measured: &[Option<Measurement>]) -> usize {
-        let mut rows = 0;
-        for m in measured.iter().flatten() {
-            self.variances[rows..rows + 3].fill(m.sigma * m.sigma);
-            rows += 3;
-        }
-        rows
+    /// Linearises at the coordinates last given to [`ControlPoints::residuals`].
+    fn linearise(
+        &mut self,
+        kinematics: &Kinematics,
+        likelihood: &mut ControlPoints,
+        measured: &[Option<Measurement>],
+        prior: &GaussianPrior,
+    ) {
+        likelihood.jacobian(kinematics, measured, self.linearisation.jacobian_mut());
+        self.linearisation.update(prior, likelihood.moved_by(measured));
     }
 
     /// Standard deviation of every coordinate under the posterior's Gaussian approximation at the solution (the
@@ -167,9 +169,9 @@ impl MapSolver {
         prior: &GaussianPrior,
         out: &mut [f64],
     ) {
-        self.set_variances(measured);
+        likelihood.variances(measured, &mut self.variances);
         likelihood.residuals(kinematics, &self.x, measured, &mut self.residuals);
-        self.linearisation.update(kinematics, likelihood, measured, prior);
+        self.linearise(kinematics, likelihood, measured, prior);
         self.linearisation.variances(prior, &self.variances, out);
         out.iter_mut().for_each(|v| *v = v.max(0.0).sqrt());
     }
