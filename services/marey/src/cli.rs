@@ -8,11 +8,11 @@ use crate::{
     status, up, upload,
 };
 
-/// Full-body human motion from few measurements: a few points, a few cameras, or both.
+/// Full-body human motion from very few measurements: a few points, a few cameras, or both.
 ///
 /// You measured the paths of a few points of a moving person (wrists, ankles, hips, head), or filmed them with calibrated
-/// cameras. Marey finds the most probable motion of the whole body and writes it as BVH for Blender, Maya or Unity, and in other
-/// formats.
+/// cameras. Marey finds the most probable motion of the whole body and writes it as BVH for Blender or MotionBuilder, and in
+/// other formats.
 #[derive(Debug, Parser)]
 #[command(name = "marey", version, max_term_width = 100, after_help = EXAMPLES)]
 pub struct Cli {

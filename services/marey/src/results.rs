@@ -12,9 +12,9 @@ use crate::watch;
 
 /// List or download the results of a run
 ///
-/// For Blender: File > Import > Motion Capture (.bvh), then motion.bvh. Of a session with cameras, look at
-/// overlay_CAMERA.mp4 first; body.glb opens in Blender by File > Import > glTF 2.0. If the run failed or was cancelled, this
-/// reports it and exits with an error, after listing what exists.
+/// For Blender: File > Import > Motion Capture (.bvh), Scale 0.01 (the file is in centimetres), then motion.bvh. Of a session
+/// with cameras, look at overlay_CAMERA.mp4 first; body.glb opens in Blender by File > Import > glTF 2.0. If the run failed or
+/// was cancelled, this reports it and exits with an error, after listing what exists.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey results \"take 3\"                # lists them

@@ -38,8 +38,8 @@ async fn find(app: &App, project_id: Uuid, run_id: Uuid) -> Result<Vec<Artefact>
 
 /// List a run's results
 ///
-/// The motion as BVH, AMC and CSV, its quality frame by frame, and `run.json`, which says how they were made. Empty until
-/// the run has succeeded.
+/// What the run has written: which files depends on its kind (docs/api.md). They appear when the run has succeeded; silhouettes
+/// appear even if it fails.
 #[utoipa::path(
     get, path = "/v1/runs/{run_id}/results", tag = "runs",
     params(("run_id" = Uuid, Path,)), responses((status = 200, body = Vec<ResultFile>)),

@@ -175,7 +175,7 @@ impl Summary {
             ),
             (
                 format!("{shown}/motion.bvh"),
-                "the same in Blender: File > Import > Motion Capture (.bvh); truth.bvh is beside it",
+                "the same in Blender: File > Import > Motion Capture (.bvh), Scale 0.01; truth.bvh is beside it",
             ),
             (format!("{cameras}/overlay_cam0.mp4"), "the body that was found, over what a camera saw"),
             (format!("{cameras}/body.glb"), "that body, moving, in Blender: File > Import > glTF 2.0"),
