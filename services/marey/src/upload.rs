@@ -145,7 +145,7 @@ mod tests {
                 assert!(help.contains(ending), "{role} {ending}");
             }
         }
-        for role in FileRole::of_sessions() {
+        for role in FileRole::session_roles() {
             assert!(help.contains(role.as_str()), "{role}");
         }
     }
