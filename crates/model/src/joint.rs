@@ -31,6 +31,33 @@ impl Axis {
     }
 }
 
+impl std::fmt::Display for Axis {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(["x", "y", "z"][self.index()])
+    }
+}
+
+/// A word that names no axis.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("found {found:?}, expected x, y or z")]
+pub struct UnknownAxis {
+    /// the word
+    pub found: String,
+}
+
+impl std::str::FromStr for Axis {
+    type Err = UnknownAxis;
+
+    fn from_str(word: &str) -> Result<Self, UnknownAxis> {
+        match word {
+            "x" => Ok(Self::X),
+            "y" => Ok(Self::Y),
+            "z" => Ok(Self::Z),
+            found => Err(UnknownAxis { found: found.to_owned() }),
+        }
+    }
+}
+
 /// What a channel moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

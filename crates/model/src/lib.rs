@@ -29,7 +29,7 @@ mod skeleton;
 pub use camera::{Camera, Distortion};
 pub use error::Error;
 pub use image::Image;
-pub use joint::{Axis, Channel, ChannelKind, Joint};
+pub use joint::{Axis, Channel, ChannelKind, Joint, UnknownAxis};
 pub use mesh::Mesh;
 pub use motion::Motion;
 pub use point_match::PointMatch;

@@ -39,20 +39,11 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
     /// Axis of the file that points up: x, y or z [default: what the file says, else y for TRC, z for C3D]
-    #[arg(long, value_parser = axis, value_name = "AXIS")]
+    #[arg(long, value_name = "AXIS")]
     up: Option<Axis>,
     /// List the known marker sets
     #[arg(long)]
     list: bool,
-}
-
-fn axis(name: &str) -> Result<Axis, String> {
-    match name {
-        "x" => Ok(Axis::X),
-        "y" => Ok(Axis::Y),
-        "z" => Ok(Axis::Z),
-        _ => Err(format!("found {name:?}, expected x, y or z")),
-    }
 }
 
 /// Runs `marey markers`.

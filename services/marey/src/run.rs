@@ -8,6 +8,7 @@ use client::{
     numbers::positive,
     parameters::{pairs, values},
 };
+use model::Axis;
 use serde_json::{Value, json};
 
 use crate::{marker_sets, watch, words::name};
@@ -72,8 +73,8 @@ struct PointsArgs {
     prefix: Option<String>,
     /// Axis of the file of points, or of the calibration, that points up: x, y or z [default: as the file says, else z for C3D
     /// and y for the others]
-    #[arg(long, value_parser = ["x", "y", "z"], value_name = "AXIS")]
-    up: Option<String>,
+    #[arg(long, value_name = "AXIS")]
+    up: Option<Axis>,
 }
 
 /// Options of a run that learns from a motion database.
@@ -160,7 +161,7 @@ impl PointsArgs {
             .with("marker_map", "--map", markers.remove("marker_map"))
             .with("marker_set", "--map", markers.remove("marker_set"))
             .with("marker_prefix", "--prefix", self.prefix.as_deref())
-            .with("up", "--up", self.up.as_deref()))
+            .with("up", "--up", self.up.map(|axis| axis.to_string())))
     }
 }
 

@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 
+use background::ModelKind;
 use formats::FileRole;
 use jobs::{
     CameraChoice, InputFile, body_model::SHIPPED, inverse_kinematics::InverseKinematics,
@@ -35,8 +36,8 @@ pub(super) struct CameraFields {
     #[schema(example = json!({"GX010042.MP4": "cam01"}))]
     camera_files: BTreeMap<String, String>,
     /// `auto` (the plate if there is one), `plate`, `adaptive` or `mixture`; `auto` when left out
-    #[schema(example = "auto")]
-    background: Option<String>,
+    #[schema(value_type = Option<String>, example = "auto")]
+    background: Option<ModelKind>,
     /// metres of one unit of the calibration, where the file doesn't say it
     #[schema(example = 0.001)]
     metres_per_unit: Option<f64>,
@@ -93,16 +94,12 @@ impl CameraFields {
     fn resolve(&self) -> Result<Parameters> {
         let refuse = |error: &dyn std::fmt::Display| Error::Unprocessable(format!("parameters.{error}"));
         let mut parameters: Parameters = json::read_parameters(self.parameters.clone())?;
-        if let Some(kind) = &self.background {
+        if let Some(kind) = self.background {
             if self.parameters.get("background").is_some_and(|given| !given["model"].is_null()) {
                 let what = "background is given twice: here and as parameters.background";
                 return Err(Error::Unprocessable(what.into()));
             }
-            parameters.background.model = serde_json::from_value(kind.as_str().into()).map_err(|_| {
-                Error::Unprocessable(format!(
-                    "background is {kind:?}, expected auto, plate, adaptive or mixture"
-                ))
-            })?;
+            parameters.background.model = kind;
         }
         parameters.check().map_err(|error| refuse(&error))?;
         Ok(parameters)

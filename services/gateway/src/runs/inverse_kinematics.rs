@@ -1,6 +1,6 @@
 //! Runs by inverse kinematics: poses of a body whose measured points are reached.
 
-use body::{MAX_DEVIATIONS, UnknownSex, Wanted};
+use body::{MAX_DEVIATIONS, Wanted};
 use formats::FileRole;
 use jobs::inverse_kinematics::{
     BodyDescription, InverseKinematics, Method, RUN_KIND, Sex, SolveInverseKinematics,
@@ -58,8 +58,8 @@ pub(super) struct InverseKinematicsRequest {
     /// `plain` (measured points alone), `priority` (then a neutral posture), `image-constrained` (measured points, silhouettes in
     /// their null space), `extended` (both in one Jacobian), `image-first`, or `reach-then-image-then-posture`; when left out
     /// `image-constrained` if the session has cameras, else `priority`
-    #[schema(example = "image-constrained")]
-    solver: Option<String>,
+    #[schema(value_type = Option<String>, example = "image-constrained")]
+    solver: Option<Method>,
     /// largest number of steps for each frame, 1 to 200; 15 when left out
     #[schema(example = 15)]
     steps: Option<usize>,
@@ -76,8 +76,8 @@ pub(super) struct InverseKinematicsRequest {
     #[schema(example = 31.0)]
     age_years: Option<f64>,
     /// `female` or `male`
-    #[schema(example = "female")]
-    sex: Option<String>,
+    #[schema(value_type = Option<String>, example = "female")]
+    sex: Option<Sex>,
     /// coefficients of the body model, standard deviations, as in `shape.json`; instead of measurements
     #[serde(default)]
     #[schema(value_type = Option<Vec<f64>>)]
@@ -117,7 +117,7 @@ impl SessionRun for InverseKinematicsRun {
             )));
         }
         let choice = self.markers.into();
-        let how = InverseKinematics { choice, ..self.inverse_kinematics.resolve(solver)? };
+        let how = InverseKinematics { choice, ..self.inverse_kinematics.resolve(solver) };
         let session_id = on.session.id;
         if solver.uses_images() {
             self.cameras.check()?;
@@ -148,7 +148,6 @@ impl SessionRun for InverseKinematicsRun {
 impl InverseKinematicsRequest {
     fn check(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::Unprocessable(what));
-        self.solver()?;
         if let Some(steps) = self.steps.filter(|steps| !(1..=STEPS.0).contains(steps)) {
             return refuse(format!("inverse_kinematics.steps is {steps}, expected 1 to {}", STEPS.0));
         }
@@ -165,7 +164,7 @@ impl InverseKinematicsRequest {
     fn check_body(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::Unprocessable(what));
         let (stature_m, mass_kg, age_years) = (self.stature_m, self.mass_kg, self.age_years);
-        let wanted = Wanted { stature_m, mass_kg, age_years, sex: self.sex()? };
+        let wanted = Wanted { stature_m, mass_kg, age_years, sex: self.sex };
         wanted.check().map_err(|error| Error::Unprocessable(format!("inverse_kinematics.{error}")))?;
         if self.alpha.is_empty() {
             return Ok(());
@@ -189,41 +188,25 @@ impl InverseKinematicsRequest {
         }
     }
 
-    fn sex(&self) -> Result<Option<Sex>> {
-        let sex = self.sex.as_deref().map(str::parse).transpose();
-        sex.map_err(|error: UnknownSex| Error::Unprocessable(format!("inverse_kinematics.{error}")))
-    }
-
-    fn solver(&self) -> Result<Option<Method>> {
-        let Some(name) = &self.solver else { return Ok(None) };
-        serde_json::from_value(name.as_str().into()).map(Some).map_err(|_| {
-            Error::Unprocessable(format!(
-                "inverse_kinematics.solver is {name:?}, expected plain, priority, image-constrained, extended, \
-                 image-first or reach-then-image-then-posture"
-            ))
-        })
-    }
-
     /// The solver that is named, or the one that suits the session's files.
     fn solver_for(&self, on: &OnSession) -> Result<Method> {
         let has_cameras = on.has(FileRole::Calibration)
             && [FileRole::Video, FileRole::Images, FileRole::Masks].into_iter().any(|role| on.has(role));
-        match self.solver()? {
+        match self.solver {
             None if has_cameras => Ok(Method::ImageConstrained),
             None => Ok(Method::Priority),
             Some(solver) if solver.uses_images() && !has_cameras => Err(Error::Unprocessable(format!(
-                "inverse_kinematics.solver is {:?}, which needs silhouettes; upload a calibration and what the cameras \
+                "inverse_kinematics.solver is {}, which needs silhouettes; upload a calibration and what the cameras \
                  saw, or choose plain or priority",
-                self.solver.as_deref().unwrap_or_default()
+                json!(solver)
             ))),
             Some(solver) => Ok(solver),
         }
     }
 
     /// Everything resolved, but for points and markers.
-    fn resolve(self, solver: Method) -> Result<InverseKinematics> {
-        let sex = self.sex()?;
-        Ok(InverseKinematics {
+    fn resolve(self, solver: Method) -> InverseKinematics {
+        InverseKinematics {
             solver,
             steps: self.steps.unwrap_or(STEPS.1),
             frame_rate: self.frame_rate,
@@ -232,9 +215,9 @@ impl InverseKinematicsRequest {
                 stature_m: self.stature_m,
                 mass_kg: self.mass_kg,
                 age_years: self.age_years,
-                sex,
+                sex: self.sex,
             },
             ..InverseKinematics::default()
-        })
+        }
     }
 }

@@ -41,8 +41,8 @@ pub(super) struct SparseRun {
     bvh_metres_per_unit: Option<f64>,
     /// `local-regression`, or to compare `nearest` (the nearest example), `lpca`, `lpcr` or `gplvm`; `local-regression` when
     /// left out
-    #[schema(example = "local-regression")]
-    method: Option<String>,
+    #[schema(value_type = Option<String>, example = "local-regression")]
+    method: Option<Method>,
     /// frames of history that the regression looks at
     #[schema(example = 2)]
     window: Option<u32>,
@@ -117,7 +117,7 @@ impl SparseRun {
     fn resolve(&self, has_own_skeleton: bool) -> Result<Parameters> {
         let mut given = self.parameters.clone();
         let named = [
-            ("method", self.method.clone().map(Value::from)),
+            ("method", self.method.map(|method| method.name().into())),
             ("window", self.window.map(Value::from)),
             ("neighbours", self.neighbours.map(Value::from)),
         ];
