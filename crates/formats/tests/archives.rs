@@ -234,7 +234,7 @@ fn a_broken_file_among_many_is_named_or_skipped() {
     let error = clips(&[entry("16.asf", "damaged"), entry("16_15.amc", AMC)]).unwrap_err().to_string();
     assert!(error.starts_with("16.asf: line 1: found \"damaged\""), "{error}");
     let error = clips(&[entry("readme.txt", "")]).unwrap_err().to_string();
-    assert!(error.contains("1 file, no motion among them"), "{error}");
+    assert!(error.contains("one file, which is no motion"), "{error}");
 }
 
 #[test]
@@ -259,5 +259,27 @@ fn the_folder_of_five_actions_is_read_from_a_tar() {
         assert_eq!(clip.subject, row.get("subject"));
         assert_eq!(clip.action, row.get("action"));
         assert_eq!(clip.motion.num_frames().to_string(), row.get("frames"));
+    }
+}
+
+#[test]
+fn what_is_called_an_archive_and_is_none_is_said_to_be_none() {
+    let text = b"just words";
+    let gz = {
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut encoder, text).unwrap();
+        encoder.finish().unwrap()
+    };
+    for (name, bytes) in
+        [("a.zip", &text[..]), ("A.TAR", text), ("a.tgz", &gz), ("a.tar.gz", &gz), ("a.tar", &[])]
+    {
+        let error = archive::entries(name, bytes, &Limits::default()).unwrap_err().to_string();
+        assert!(
+            error.starts_with("found a file that is no archive with files in it, expected a .zip"),
+            "{error}"
+        );
+    }
+    for (name, bytes) in [("a.csv", &text[..]), ("a.csv.gz", &gz), ("zip", text)] {
+        assert_eq!(archive::entries(name, bytes, &Limits::default()).unwrap().len(), 1, "{name}");
     }
 }

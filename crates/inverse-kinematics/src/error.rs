@@ -14,6 +14,9 @@ pub enum Error {
         /// how many there should be
         expected: usize,
     },
+    /// A figure of which nothing is measured.
+    #[error("there is no measured point to reach, expected at least one")]
+    NoPoints,
     /// A point that is not there.
     #[error("{what} names point {point}, the chain has {points}")]
     UnknownPoint {

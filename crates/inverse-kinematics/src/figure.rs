@@ -91,11 +91,10 @@ impl Figure {
     /// A solver of its frames; `steps`: most of one solve.
     ///
     /// # Errors
-    /// [`Error::Setting`] if nothing of it is measured, or there is no step.
+    /// [`Error::NoPoints`] if nothing of it is measured, [`Error::Setting`] if there is no step.
     pub fn solver(&self, method: Method, steps: usize) -> Result<SequenceSolver> {
         if self.targeted.is_empty() {
-            let name = "number of measured points";
-            return Err(Error::Setting { name, value: 0.0, expected: "1 or more" });
+            return Err(Error::NoPoints);
         }
         if steps == 0 {
             return Err(Error::Setting { name: "steps", value: 0.0, expected: "1 or more" });

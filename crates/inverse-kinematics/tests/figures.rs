@@ -149,7 +149,7 @@ fn figures_that_nothing_is_measured_of_are_refused() {
     let model = BodyModel::shipped();
     let figure = Figure::body(&model, &model.shape(&[]), &[]).unwrap();
     let error = figure.solver(Method::Plain, 15).unwrap_err();
-    assert_eq!(error.to_string(), "number of measured points is 0, expected 1 or more");
+    assert_eq!(error.to_string(), "there is no measured point to reach, expected at least one");
     let figure = Figure::body(&model, &model.shape(&[]), &points(&model)).unwrap();
     assert_eq!(figure.solver(Method::Plain, 0).unwrap_err().to_string(), "steps is 0, expected 1 or more");
 }

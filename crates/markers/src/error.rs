@@ -18,6 +18,18 @@ pub enum Error {
         /// what it may be
         expected: &'static str,
     },
+    /// Too few or too many of something in a map.
+    #[error("marker map: {place}found {found} {what}, expected {expected}")]
+    Count {
+        /// the point with `: ` behind it, or nothing
+        place: String,
+        /// what was counted
+        what: &'static str,
+        /// how many there are
+        found: usize,
+        /// how many there may be
+        expected: &'static str,
+    },
     /// No preset has that name.
     #[error("there is no marker set {name:?}, expected one of: {known}")]
     NoSuchPreset {

@@ -67,8 +67,8 @@ impl MarkerMap {
         check_depth(text)?;
         let file: File =
             toml::from_str(text).map_err(|error| Error::Syntax { message: one_line(text, &error) })?;
-        count("number of points", file.points.len(), 1, MAX_POINTS, "1 to 64")?;
-        count("number of markers", file.markers.len(), 0, MAX_MARKERS, "at most 512")?;
+        count("", "points", file.points.len(), 1, MAX_POINTS, "1 to 64")?;
+        count("", "markers", file.markers.len(), 0, MAX_MARKERS, "at most 512")?;
         let mut points = BTreeMap::new();
         for (name, entry) in file.points {
             let point = point(&name, entry, file.sigma_mm)?;
@@ -90,9 +90,9 @@ fn check_depth(text: &str) -> Result<()> {
         }
         deepest = deepest.max(depth);
     }
-    count("depth of brackets", deepest, 0, MAX_DEPTH, "at most 64")?;
+    count("", "brackets inside each other", deepest, 0, MAX_DEPTH, "at most 64")?;
     let dots = text.lines().map(|line| line.matches('.').count()).max().unwrap_or(0);
-    count("number of dots in a line", dots, 0, MAX_DOTS, "at most 256")
+    count("", "dots in a line", dots, 0, MAX_DOTS, "at most 256")
 }
 
 fn point(name: &str, entry: Entry, sigma_mm: Option<f64>) -> Result<Point> {
@@ -103,14 +103,14 @@ fn point(name: &str, entry: Entry, sigma_mm: Option<f64>) -> Result<Point> {
         Entry::Group(group) => vec![group],
         Entry::Choices(choices) => choices,
     };
-    count(&format!("{name}: number of choices"), entries.len(), 1, MAX_CHOICES, "1 to 8")?;
+    count(name, "choices", entries.len(), 1, MAX_CHOICES, "1 to 8")?;
     let choices = entries.into_iter().map(|entry| group(name, entry, sigma_mm));
     Ok(Point { name: name.to_owned(), choices: choices.collect::<Result<_>>()? })
 }
 
 fn group(point: &str, entry: GroupEntry, sigma_mm: Option<f64>) -> Result<Group> {
     let what = |key: &str| format!("{point}: {key}");
-    count(&what("number of markers"), entry.markers.len(), 1, MAX_GROUP, "1 to 32")?;
+    count(point, "markers", entry.markers.len(), 1, MAX_GROUP, "1 to 32")?;
     if let Some((i, twice)) =
         entry.markers.iter().enumerate().find(|(i, marker)| entry.markers[..*i].contains(marker))
     {
@@ -147,11 +147,20 @@ fn group(point: &str, entry: GroupEntry, sigma_mm: Option<f64>) -> Result<Group>
     })
 }
 
-fn count(what: &str, found: usize, low: usize, high: usize, expected: &'static str) -> Result<()> {
+/// Refuses too few or too many of something, in the map or in one of its points.
+fn count(
+    point: &str,
+    what: &'static str,
+    found: usize,
+    low: usize,
+    high: usize,
+    expected: &'static str,
+) -> Result<()> {
     if (low..=high).contains(&found) {
         return Ok(());
     }
-    Err(value(what, found.to_string(), expected))
+    let place = if point.is_empty() { String::new() } else { format!("{point}: ") };
+    Err(Error::Count { place, what, found, expected })
 }
 
 fn value(what: &str, found: String, expected: &'static str) -> Error {
@@ -207,10 +216,10 @@ mod tests {
     fn what_is_wrong_with_a_map_is_said_with_its_place() {
         let cases = [
             ("", "missing field `points`"),
-            ("[points]", "number of points is 0, expected 1 to 64"),
+            ("[points]", "found 0 points, expected 1 to 64"),
             ("[points]\nhead = 3", "line 2: expected a marker's name, a list of names"),
             ("[points]\nhead = [[[", "line 2"),
-            ("[points]\nhead = []", "head: number of markers is 0, expected 1 to 32"),
+            ("[points]\nhead = []", "head: found 0 markers, expected 1 to 32"),
             ("pionts = 1\n[points]\nhead = 'A'", "line 1: unknown field `pionts`"),
             ("[points]\nhead = ['A', 'A']", "head: marker 2 is \"A\" again, expected each marker once"),
             ("[points]\nhead = {markers = ['A'], weights = [1, 2]}", "head: weights is 2 numbers"),

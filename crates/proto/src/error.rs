@@ -31,6 +31,16 @@ pub enum Error {
         /// The range.
         expected: &'static str,
     },
+    /// Too few or too many of something.
+    #[error("found {found} {what}, expected {expected}")]
+    Count {
+        /// What was counted.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        expected: &'static str,
+    },
     /// A coordinate or channel value is NaN or infinite.
     #[error("frame {frame}: {what} is {found}, expected a finite number")]
     NotFinite {

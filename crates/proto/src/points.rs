@@ -25,7 +25,8 @@ pub fn trajectories(frames: &[v1::ControlPointFrame], frame_rate: f64) -> Result
             names.push(name.clone());
         }
         if names.len() > MAX_POINTS {
-            return Err(out_of_range("control points", names.len(), "at most 256 names"));
+            let expected = "at most 256";
+            return Err(Error::Count { what: "control points", found: names.len(), expected });
         }
     }
     if names.is_empty() {

@@ -7,7 +7,6 @@ use jobs::{
     motion_database::{BuildMotionDatabase, ImportMotion, MotionDatabaseFile, PlanMotionDatabase},
 };
 use library::{motion_database, motion_database::Index};
-use model::counted;
 use motion_db::MotionDatabase;
 use queue::{Artefact, ChildJob, Handler, JobContext, JobError, Outcome};
 use service::{Resources, compute, objects};
@@ -113,11 +112,12 @@ impl PlanHandler {
         }
         self.close_part(context, &mut divided).await?;
         if divided.motions.is_empty() && request.base.is_none() {
-            let message = format!(
-                "found {}, no motion among them; expected at least one AMC file with its ASF file, or a \
-                 BVH file",
-                counted(num_entries, "file")
-            );
+            let found = match num_entries {
+                0 => "there is no file in what was uploaded".to_owned(),
+                1 => "found one file, which is no motion".to_owned(),
+                several => format!("found {several} files, no motion among them"),
+            };
+            let message = format!("{found}; expected at least one AMC file with its ASF file, or a BVH file");
             return Err(JobError::give_up(message, ""));
         }
         Ok(divided)

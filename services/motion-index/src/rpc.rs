@@ -88,7 +88,8 @@ impl MotionIndex for Rpc {
         let samples = request.control_points.as_ref().map(|frame| frame.samples.len());
         let samples = samples.ok_or(proto::Error::Missing { field: "control_points" })?;
         if samples < 2 {
-            return Err(out_of_range("control_points", samples, "at least two samples").into());
+            let (what, expected) = ("samples in control_points", "at least 2");
+            return Err(proto::Error::Count { what, found: samples, expected }.into());
         }
         let found = self.fan_out.find_poses(&request).await?;
         let matches = found

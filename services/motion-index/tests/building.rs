@@ -196,7 +196,7 @@ async fn uploads_that_are_no_motion_fail_the_build_and_say_why() {
     let amc = walker::amc(1, 20);
     let other = amc.replace("lfemur", "tail");
     let cases = [
-        ("notes.zip", tar(&[("readme.txt", b"nothing")]), "no motion among them"),
+        ("notes.zip", tar(&[("readme.txt", b"nothing")]), "found one file, which is no motion"),
         ("orphan.tar", tar(&[("7_01.amc", amc.as_bytes())]), "no ASF file"),
         ("odd.tar", tar(&[("7.asf", walker::ASF.as_bytes()), ("7_01.amc", other.as_bytes())]), "7_01.amc"),
         (
@@ -205,7 +205,7 @@ async fn uploads_that_are_no_motion_fail_the_build_and_say_why() {
             "8 frames",
         ),
         ("index.tar", tar(&[("index.csv", b"a,b\n1,2\n"), ("7_01.amc", amc.as_bytes())]), "index.csv"),
-        ("empty.zip", Vec::new(), "no motion among them"),
+        ("empty.zip", Vec::new(), "empty.zip: found a file that is no archive with files in it"),
         ("damaged.tar.zst", b"\x28\xb5\x2f\xfd\x00rest".to_vec(), "damaged.tar.zst"),
     ];
     for (name, content, expected) in cases {

@@ -92,6 +92,14 @@ pub enum InputError {
         /// Names of some of them, separated by commas.
         some: String,
     },
+    /// Points and cameras have no frame in common, or the points have none.
+    #[error(
+        "there is no frame to solve; expected at least one that has measured points, and pictures where cameras are used"
+    )]
+    NoFrame,
+    /// No point in any frame.
+    #[error("no point was measured in any frame, expected at least one")]
+    NothingMeasured,
     /// Something of a request is out of range.
     #[error("{field} is {found}, expected {expected}")]
     OutOfRange {

@@ -33,7 +33,8 @@ impl Rpc {
         let id = proto::id("database_id", &request.database_id)?;
         let frames = request.frames.len();
         if !(1..=MAX_FRAMES).contains(&frames) {
-            return Err(out_of_range("frames", frames, "1 to 600 frames").into());
+            let (what, expected) = ("frames", "1 to 600");
+            return Err(proto::Error::Count { what, found: frames, expected }.into());
         }
         let rate = if request.frame_rate_hz == 0.0 { DEFAULT_FRAME_RATE } else { request.frame_rate_hz };
         if !FRAME_RATES.contains(&rate) {
@@ -41,7 +42,7 @@ impl Rpc {
         }
         let seconds = frames as f64 / rate;
         if seconds > MAX_SECONDS {
-            return Err(out_of_range("length of the frames in seconds", seconds, "at most 20").into());
+            return Err(out_of_range("length of the frames", format!("{seconds} s"), "at most 20 s").into());
         }
         let trajectories = proto::points::trajectories(&request.frames, rate)?;
         let file = self.shared.motion_database(id).await?;

@@ -155,7 +155,7 @@ async fn what_can_not_be_solved_is_refused_with_what_was_found() {
         changed
     };
     let cases = [
-        (frames(&|f| f.clear()), Code::InvalidArgument, "frames is 0, expected 1 to 600 frames"),
+        (frames(&|f| f.clear()), Code::InvalidArgument, "found 0 frames, expected 1 to 600"),
         (
             v1::SolveInverseKinematicsRequest { steps: 201, ..request.clone() },
             Code::InvalidArgument,

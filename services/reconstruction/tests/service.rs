@@ -298,7 +298,7 @@ async fn a_pose_is_solved_at_once() {
     assert_eq!(client.solve_pose(single).await.unwrap().into_inner().frames.len(), 1);
 
     let cases = [
-        (v1::SolvePoseRequest { frames: vec![], ..request.clone() }, Code::InvalidArgument, "frames is 0"),
+        (v1::SolvePoseRequest { frames: vec![], ..request.clone() }, Code::InvalidArgument, "found 0 frames"),
         (
             v1::SolvePoseRequest { database_id: Uuid::nil().to_string(), ..request.clone() },
             Code::NotFound,
@@ -321,7 +321,7 @@ async fn a_pose_is_solved_at_once() {
                 ..request.clone()
             },
             Code::InvalidArgument,
-            "length of the frames in seconds is 30, expected at most 20",
+            "length of the frames is 30 s, expected at most 20 s",
         ),
         (
             v1::SolvePoseRequest { frame_rate_hz: f64::NAN, ..request },

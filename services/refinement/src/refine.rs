@@ -24,7 +24,8 @@ pub(crate) fn check(request: &v1::RefineFrameRequest) -> Result<(), proto::Error
     let least = if request.start.is_some() { 1 } else { 2 };
     if !(least..=MAX_VIEWS).contains(&request.silhouettes.len()) {
         let expected = if least == 1 { "1 to 64" } else { "2 to 64, as no start is given" };
-        return Err(out_of_range("silhouettes", request.silhouettes.len(), expected));
+        let (what, found) = ("silhouettes", request.silhouettes.len());
+        return Err(proto::Error::Count { what, found, expected });
     }
     if let Some(found) = request.alpha.iter().find(|a| a.is_nan() || a.abs() > MOST_ALPHA) {
         return Err(out_of_range("alpha", found, "-6 to 6 standard deviations"));

@@ -63,8 +63,8 @@ impl Rpc {
             return Err(out_of_range("cell_m", &cell_m.to_string(), "0.004 to 0.1").into());
         }
         if !(2..=MAX_VIEWS).contains(&request.silhouettes.len()) {
-            let found = request.silhouettes.len().to_string();
-            return Err(out_of_range("silhouettes", &found, "2 to 64").into());
+            let (what, found) = ("silhouettes", request.silhouettes.len());
+            return Err(proto::Error::Count { what, found, expected: "2 to 64" }.into());
         }
         let carved = self.slots.run(move || -> Result<_, CallError> {
             let seen = views(&request.calibration_name, &request.calibration, &request.silhouettes)?;

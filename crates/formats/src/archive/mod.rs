@@ -47,7 +47,7 @@ pub struct Entry {
 /// with `name`, unpacked if it is compressed. Members compressed singly are unpacked; archives inside are not opened.
 ///
 /// # Errors
-/// If the archive or a member is damaged, or exceeds the limits.
+/// If the archive or a member is damaged, or exceeds the limits, or if only the name is that of an archive.
 pub fn entries(name: &str, bytes: &[u8], limits: &Limits) -> Result<Vec<Entry>> {
     entries_where(name, bytes, limits, |_| true)
 }
@@ -91,18 +91,33 @@ pub fn entries_where(
             read.map_err(|e| stream.error(compression.name(), &e))?;
             if tar::is_header(&head) {
                 tar::read(head.as_slice().chain(unpacked), &stream, &mut unpacking)?;
-            } else if unpacking.takes_next(without_compression(name).as_bytes())? {
+                return Ok(unpacking.entries);
+            }
+            refuse_name_of_archive(name)?;
+            if unpacking.takes_next(without_compression(name).as_bytes())? {
                 unpacked.read_to_end(&mut head).map_err(|e| stream.error(compression.name(), &e))?;
                 unpacking.push(without_compression(name).as_bytes(), head);
             }
         }
         Kind::Plain => {
+            refuse_name_of_archive(name)?;
             if unpacking.takes_next(name.as_bytes())? {
                 unpacking.push(name.as_bytes(), bytes.to_vec());
             }
         }
     }
     Ok(unpacking.entries)
+}
+
+/// Refuses what is no archive and is called one: nobody looks for what is in it by that name.
+fn refuse_name_of_archive(name: &str) -> Result<()> {
+    if name::is_of_archive(name) {
+        return Err(Error::whole_file(
+            "a file that is no archive with files in it",
+            "a .zip, .tar, .tar.gz or .tar.zst archive, as its name says",
+        ));
+    }
+    Ok(())
 }
 
 #[derive(Debug, Clone, Copy)]

@@ -15,6 +15,12 @@ pub fn without_compression(name: &str) -> &str {
     [".zst", ".gz"].iter().find(|e| is_ending(e)).map_or(name, |e| &name[..name.len() - e.len()])
 }
 
+/// Whether a file's name says that it is an archive of several files.
+pub(super) fn is_of_archive(name: &str) -> bool {
+    let extension = without_compression(name).rsplit_once('.').map(|(_, extension)| extension);
+    extension.is_some_and(|found| ["zip", "tar", "tgz", "tzst"].iter().any(|e| found.eq_ignore_ascii_case(e)))
+}
+
 /// Folders and name, separated by `/`, without what could lead out of a folder.
 pub(super) fn clean(name: &[u8]) -> String {
     let name = String::from_utf8_lossy(name).replace(char::is_control, "_");

@@ -6,7 +6,7 @@ mod pairing;
 mod path;
 mod skeletons;
 
-use model::{Motion, counted};
+use model::Motion;
 
 use crate::{
     Error, Place, Read, Result, Warning, amc,
@@ -119,8 +119,12 @@ pub fn clips(entries: &[Entry], options: &Options) -> Result<Read<Vec<MotionFile
     }
     if clips.is_empty() {
         let skipped = warnings.iter().map(|w| w.message.as_str()).next();
-        let found = skipped
-            .map_or_else(|| format!("{}, no motion among them", counted(files.len(), "file")), str::to_owned);
+        let found = match (skipped, files.len()) {
+            (Some(skipped), _) => skipped.to_owned(),
+            (None, 0) => "no file".to_owned(),
+            (None, 1) => "one file, which is no motion".to_owned(),
+            (None, several) => format!("{several} files, no motion among them"),
+        };
         return Err(Error::whole_file(found, "at least one AMC file with its ASF file, or a BVH file"));
     }
     Ok(Read { value: clips, warnings })

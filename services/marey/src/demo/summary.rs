@@ -215,8 +215,8 @@ impl Summary {
         let stature_off = (followed.stature_m - cameras::CAPTURE.stature_m()).abs();
         expect("stature, m off", stature_off, MOST_STATURE_M);
         if followed.num_frames < cameras::CAPTURE.frames {
-            let expected = cameras::CAPTURE.frames;
-            short.push(format!("frames in front of cameras: {}, expected {expected}", followed.num_frames));
+            let (found, expected) = (followed.num_frames, cameras::CAPTURE.frames);
+            short.push(format!("the person was followed through {found} frames, expected {expected}"));
         }
         let missing =
             self.places().into_iter().map(|(file, _)| file).filter(|file| !output.join(file).exists());

@@ -32,15 +32,14 @@ const DEFAULT_STEPS: usize = 15;
 /// # Errors
 /// With the field that is out of range.
 pub(crate) fn check(request: &v1::SolveInverseKinematicsRequest) -> Result<(), proto::Error> {
-    let refuse = |field, found: usize, expected| {
-        Err(proto::Error::OutOfRange { field, found: found.to_string(), expected })
-    };
+    let refuse = |what, found, expected| Err(proto::Error::Count { what, found, expected });
     let frames = request.frames.len();
     if !(1..=MAX_FRAMES).contains(&frames) {
-        return refuse("frames", frames, "1 to 600 frames");
+        return refuse("frames", frames, "1 to 600");
     }
     if request.steps as usize > MAX_STEPS {
-        return refuse("steps", request.steps as usize, "1 to 200, or 0 for 15");
+        let (found, expected) = (request.steps.to_string(), "1 to 200, or 0 for 15");
+        return Err(proto::Error::OutOfRange { field: "steps", found, expected });
     }
     if request.calibration.len() > MAX_CALIBRATION_BYTES {
         return refuse("bytes of calibration", request.calibration.len(), "at most 1048576");
@@ -51,7 +50,7 @@ pub(crate) fn check(request: &v1::SolveInverseKinematicsRequest) -> Result<(), p
     }
     let all: usize = request.frames.iter().map(|frame| frame.silhouettes.len()).sum();
     if all > MAX_SILHOUETTES {
-        return refuse("silhouettes", all, "at most 2400");
+        return refuse("silhouettes in all frames", all, "at most 2400");
     }
     if all > 0 && request.calibration.is_empty() {
         return Err(proto::Error::Missing { field: "calibration (there are silhouettes)" });
@@ -76,10 +75,8 @@ pub(crate) fn solve(
     let trajectories = proto::points::trajectories(&targets.collect::<Vec<_>>(), 1.0)?;
     let names = trajectories.names();
     if names.len() > MAX_POINTS {
-        let found = names.len().to_string();
-        return Err(
-            proto::Error::OutOfRange { field: "control points", found, expected: "1 to 16 names" }.into()
-        );
+        let (what, found, expected) = ("control points", names.len(), "1 to 16");
+        return Err(proto::Error::Count { what, found, expected }.into());
     }
     let figure = figure(request, model, &trajectories)?;
     let has_images = request.frames.iter().any(|frame| !frame.silhouettes.is_empty());

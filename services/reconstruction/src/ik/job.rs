@@ -143,7 +143,7 @@ impl IkHandler {
             let own = chosen.trajectories.frame_rate();
             let rate = request.how.frame_rate.or(rate_of_cameras).unwrap_or(own);
             if !FRAME_RATES.contains(&rate) {
-                return Err(out_of_range("frames a second", rate, "1 to 1000"));
+                return Err(out_of_range("the frame rate", rate, "1 to 1000 frames a second"));
             }
             let first = request.cameras.as_ref().map_or(0, |planned| planned.first_frame);
             let mut frames = Frames::within(&chosen.trajectories, first, rate);
@@ -161,7 +161,7 @@ impl IkHandler {
                 frames.count = frames.count.min(seen);
             }
             if frames.count == 0 {
-                return Err(out_of_range("frames that were measured", 0.0, "1 or more"));
+                return Err(InputError::NoFrame);
             }
             if frames.count > limit {
                 return Err(InputError::TooLong { frames: frames.count, limit });
@@ -173,7 +173,8 @@ impl IkHandler {
             outliers::check_unit(&measured, &reach, &chosen.points)?;
             if let Some(Outlier { frame, point }) = out.first() {
                 warnings.push(format!(
-                    "{} of the measured points out of reach of a body; ignored (the first: {} in frame {frame})",
+                    "positions that no body reaches from the other points are ignored: {}, the first of {} in frame \
+                     {frame}",
                     counted(out.len(), "sample"),
                     chosen.points[*point].name
                 ));
@@ -186,7 +187,7 @@ impl IkHandler {
                 ));
             }
             if measured.iter().flatten().all(|position| position.x.is_nan()) {
-                return Err(out_of_range("frames with a measured point", 0.0, "1 or more"));
+                return Err(InputError::NothingMeasured);
             }
             Ok(Problem { shape, figure, points: chosen.points, frames, measured, warnings, model })
         });

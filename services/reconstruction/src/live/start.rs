@@ -33,7 +33,8 @@ impl LiveRpc {
         let delivery = LiveDelivery::try_from(start.delivery)
             .map_err(|_| out_of_range("delivery", start.delivery, "latest or every"))?;
         if start.skeleton_asf.len() > MAX_SKELETON_BYTES {
-            return Err(out_of_range("length of skeleton_asf", start.skeleton_asf.len(), "at most 1 MiB"));
+            let found = format!("{} bytes long", start.skeleton_asf.len());
+            return Err(out_of_range("skeleton_asf", found, "at most 1 MiB"));
         }
         let parameters = parameters(&start.parameters_json)?;
         let file = self.shared.motion_database(id).await?;
