@@ -110,6 +110,7 @@ impl<'s> Reader<'s> {
             UseTree::Name(name) => (name.ident.to_string(), name.ident.to_string()),
             UseTree::Rename(rename) => (rename.ident.to_string(), rename.rename.to_string()),
             UseTree::Glob(_) => {
+                // one name alone would not be looked at as a path
                 before.push("*".to_owned());
                 let module = self.path_from_root(before).map(|path| path[..path.len() - 1].to_vec());
                 before.pop();
