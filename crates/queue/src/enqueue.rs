@@ -5,43 +5,12 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 use sqlx::PgConnection;
 
-use crate::{ChildJob, Error, JobId, NewJob, ProjectId, RunId, RunState, channels};
+use crate::{ChildJob, Error, JobId, ProjectId, RunId, RunState, channels};
 
-/// Adds one job to a run.
+/// Adds jobs that depend on each other to a run. Returns their ids in the order given.
 ///
-/// In an open transaction this keeps no other enqueuer waiting, whatever the run. (Until it ends, the run
-/// itself cannot end, and with `depends_on` the jobs of this run cannot complete.)
-///
-/// # Errors
-/// [`Error::NoSuchRun`], [`Error::RunFinished`], [`Error::NoSuchDependency`].
-pub async fn enqueue(connection: &mut PgConnection, job: &NewJob<'_>) -> Result<JobId, Error> {
-    let (project_id, pending) = if job.depends_on.is_empty() {
-        (lock_run(connection, job.run_id, Lock::Run).await?, 0)
-    } else {
-        let project_id = lock_run(connection, job.run_id, Lock::RunAndCompletions).await?;
-        (project_id, count_pending(connection, job.run_id, job.depends_on).await?)
-    };
-    let id = draw_ids(connection, 1).await?[0];
-    let rows = Rows {
-        ids: vec![id],
-        kinds: vec![job.kind],
-        payloads: vec![&job.payload],
-        payload_versions: vec![job.payload_version],
-        priorities: vec![job.priority],
-        weights: vec![job.weight],
-        max_attempts: vec![job.max_attempts],
-        pending: vec![pending],
-    };
-    rows.insert(connection, job.run_id, project_id).await?;
-    let mut depends_on = job.depends_on.to_vec();
-    depends_on.sort_unstable();
-    depends_on.dedup();
-    insert_dependencies(connection, job.run_id, &vec![id; depends_on.len()], &depends_on).await?;
-    Ok(id)
-}
-
-/// Adds jobs that depend on each other to a run. Returns their ids in the order given. As
-/// [`enqueue`], it keeps no other enqueuer waiting.
+/// In an open transaction this keeps no other enqueuer waiting, whatever the run. (Until it ends, the run itself cannot
+/// end.)
 ///
 /// # Errors
 /// [`Error::NoSuchRun`], [`Error::RunFinished`], [`Error::DependencyNotEarlier`].
@@ -60,7 +29,7 @@ pub async fn enqueue_many(
         pending.push(dependencies.len() as i32);
         edges.extend(dependencies.into_iter().map(|earlier| (index, earlier)));
     }
-    let project_id = lock_run(connection, run_id, Lock::Run).await?;
+    let project_id = lock_run(connection, run_id).await?;
     if jobs.is_empty() {
         return Ok(Vec::new());
     }
@@ -82,42 +51,17 @@ pub async fn enqueue_many(
     Ok(ids)
 }
 
-enum Lock {
-    Run,
-    RunAndCompletions,
-}
-
-async fn lock_run(connection: &mut PgConnection, run_id: RunId, lock: Lock) -> Result<ProjectId, Error> {
-    let query = match lock {
-        Lock::Run => include_str!("../queries/run_for_enqueue.sql"),
-        Lock::RunAndCompletions => include_str!("../queries/run_for_enqueue_after_jobs.sql"),
-    };
-    let row: Option<(ProjectId, String)> =
-        sqlx::query_as(query).bind(run_id).fetch_optional(connection).await?;
+async fn lock_run(connection: &mut PgConnection, run_id: RunId) -> Result<ProjectId, Error> {
+    let row: Option<(ProjectId, String)> = sqlx::query_as(include_str!("../queries/run_for_enqueue.sql"))
+        .bind(run_id)
+        .fetch_optional(connection)
+        .await?;
     let (project_id, state) = row.ok_or(Error::NoSuchRun(run_id))?;
     let state: RunState = state.parse()?;
     if state.is_finished() {
         return Err(Error::RunFinished { run_id, state });
     }
     Ok(project_id)
-}
-
-async fn count_pending(connection: &mut PgConnection, run_id: RunId, ids: &[JobId]) -> Result<i32, Error> {
-    let expected = ids.iter().collect::<BTreeSet<_>>().len();
-    let (found, pending): (i64, i64) = sqlx::query_as(include_str!("../queries/count_dependencies.sql"))
-        .bind(run_id)
-        .bind(ids)
-        .fetch_one(connection)
-        .await?;
-    if found as usize != expected {
-        return Err(Error::NoSuchDependency {
-            run_id,
-            depends_on: ids.to_vec(),
-            found: found as usize,
-            expected,
-        });
-    }
-    Ok(pending as i32)
 }
 
 /// Drawn in one statement, but sorted by us: nothing promises the order of the rows.

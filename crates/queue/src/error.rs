@@ -1,6 +1,6 @@
 //! What the queue refuses, and why attempts at jobs fail.
 
-use crate::{JobId, RunId, RunState, UnknownState};
+use crate::{RunId, RunState, UnknownState};
 
 /// What can go wrong in a call to the queue.
 #[derive(Debug, thiserror::Error)]
@@ -27,18 +27,6 @@ pub enum Error {
         index: usize,
         /// The position it named.
         depends_on: usize,
-    },
-    /// A job depends on a job that is not in its run.
-    #[error("run {run_id} has {found} of the {expected} jobs to depend on: {depends_on:?}")]
-    NoSuchDependency {
-        /// The run.
-        run_id: RunId,
-        /// What was asked for.
-        depends_on: Vec<JobId>,
-        /// How many of them there are.
-        found: usize,
-        /// How many there should be.
-        expected: usize,
     },
     /// A payload that is no JSON.
     #[error("the payload of a {kind} job can't be stored: {source}")]

@@ -29,52 +29,7 @@ pub trait Job: Serialize + DeserializeOwned + Send + 'static {
     }
 }
 
-/// The payload of a job as it is stored.
-fn payload<J: Job>(job: &J) -> Result<Value, Error> {
-    serde_json::to_value(job).map_err(|source| Error::Payload { kind: J::KIND, source })
-}
-
-/// A job to be added to a run.
-#[derive(Debug, Clone)]
-pub struct NewJob<'a> {
-    /// The run that it belongs to.
-    pub run_id: RunId,
-    /// Which handler runs it.
-    pub kind: &'static str,
-    /// What the handler is given.
-    pub payload: Value,
-    /// Version of the payload.
-    pub payload_version: i32,
-    /// Higher goes first within a project; 0 is usual.
-    pub priority: i16,
-    /// After so many failed attempts the job has failed for good; 1 to 1000.
-    pub max_attempts: i32,
-    /// Jobs of the same run that must have succeeded before.
-    pub depends_on: &'a [JobId],
-    /// Share in the run's progress, above 0; 1 is usual.
-    pub weight: f64,
-}
-
-impl<'a> NewJob<'a> {
-    /// A job with the usual priority and weight that depends on nothing.
-    ///
-    /// # Errors
-    /// [`Error::Payload`].
-    pub fn new<J: Job>(run_id: RunId, job: &J) -> Result<Self, Error> {
-        Ok(Self {
-            run_id,
-            kind: J::KIND,
-            payload: payload(job)?,
-            payload_version: J::VERSION,
-            priority: 0,
-            max_attempts: J::MAX_ATTEMPTS,
-            depends_on: &[],
-            weight: 1.0,
-        })
-    }
-}
-
-/// A job of a batch: the children that a job asks for when it completes, or the jobs of a new run.
+/// A job to be added to a run in a batch: the jobs that another asks for when it completes, or those of a new run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChildJob {
     /// Which handler runs it.
@@ -101,7 +56,7 @@ impl ChildJob {
     pub fn new<J: Job>(job: &J) -> Result<Self, Error> {
         Ok(Self {
             kind: J::KIND,
-            payload: payload(job)?,
+            payload: serde_json::to_value(job).map_err(|source| Error::Payload { kind: J::KIND, source })?,
             payload_version: J::VERSION,
             priority: 0,
             max_attempts: J::MAX_ATTEMPTS,
@@ -121,20 +76,6 @@ impl ChildJob {
     #[must_use]
     pub fn weight(mut self, weight: f64) -> Self {
         self.weight = weight;
-        self
-    }
-
-    /// The same job with another priority; higher goes first within a project.
-    #[must_use]
-    pub fn priority(mut self, priority: i16) -> Self {
-        self.priority = priority;
-        self
-    }
-
-    /// The same job with another number of attempts, 1 to 1000.
-    #[must_use]
-    pub fn max_attempts(mut self, attempts: i32) -> Self {
-        self.max_attempts = attempts;
         self
     }
 }

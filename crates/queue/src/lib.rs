@@ -67,11 +67,11 @@ mod worker;
 
 pub use backoff::RetryPolicy;
 pub use claim::{claim, is_any_available};
-pub use enqueue::{enqueue, enqueue_many};
+pub use enqueue::enqueue_many;
 pub use error::{Error, JobError};
 pub use finish::{Completion, Failure, Lease, Settled, acknowledge_cancel, complete, fail, hand_back};
 pub use ids::{JobId, LeaseNumber, ProjectId, RunId};
-pub use job::{Artefact, ChildJob, ClaimedJob, DEFAULT_MAX_ATTEMPTS, Job, NewJob};
+pub use job::{Artefact, ChildJob, ClaimedJob, DEFAULT_MAX_ATTEMPTS, Job};
 pub use lease::{Beat, BeatAnswer, heartbeat};
 pub use on_complete::OnComplete;
 pub use read::{Depth, InputArtefact, dependency_artefacts, depth, run_results};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use queue::{Outcome, RetryPolicy, RunState, Worker};
+use queue::{ChildJob, Outcome, RetryPolicy, RunState, Worker};
 use serde_json::json;
 use sqlx::PgPool;
 use sqlx::postgres::PgConnectOptions;
@@ -64,7 +64,7 @@ async fn jobs_of_a_process_that_is_killed_go_to_another() {
 async fn a_job_that_kills_every_worker_ends_as_failed_with_that_reason() {
     let queue = Queue::new().await;
     queue.set_staleness(Duration::from_secs(1)).await;
-    let (run_id, ids) = queue.run(&[job(Poison, json!(null)).max_attempts(2)]).await;
+    let (run_id, ids) = queue.run(&[ChildJob { max_attempts: 2, ..job(Poison, json!(null)) }]).await;
     // Only reaps.
     let _worker = queue.worker().handler(succeeds(Nothing)).start(CancellationToken::new());
     for attempt in 1..=2 {

@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use queue::{Artefact, JobContext, JobError, NewJob, Outcome, RunState};
+use queue::{Artefact, ChildJob, JobContext, JobError, Outcome, RunState};
 use serde_json::json;
 use tokio_util::sync::CancellationToken;
 
-use crate::support::{After, Build, Chunk, Merge, Other, Plan, Queue, does, job, jobs, reads};
+use crate::support::{Build, Chunk, Merge, Plan, Queue, does, job, jobs, reads};
 
 fn artefact(name: &str, store_key: String, is_result: bool) -> Artefact {
     Artefact {
@@ -72,35 +72,16 @@ async fn a_thousand_chunks_fan_out_of_one_job_and_into_one() {
 }
 
 #[tokio::test]
-async fn a_job_may_depend_on_jobs_that_have_succeeded_already() {
-    let queue = Queue::new().await;
-    let (run_id, ids) = queue.run(&[jobs(Chunk, 1), jobs(Other, 1)].concat()).await;
-    let job = queue.claim("chunk", 1).await.remove(0);
-    let mut connection = queue.pool.acquire().await.unwrap();
-    queue::complete(&mut connection, &crate::leases::lease(&job), &queue::Completion::default())
-        .await
-        .unwrap();
-    let after = NewJob { depends_on: &ids[..1], ..NewJob::new(run_id, &After(json!(null))).unwrap() };
-    queue::enqueue(&mut connection, &after).await.unwrap();
-    let after_both = NewJob { depends_on: &ids, ..NewJob::new(run_id, &After(json!(null))).unwrap() };
-    queue::enqueue(&mut connection, &after_both).await.unwrap();
-    assert_eq!(queue.claim("after", 9).await.len(), 1);
-}
-
-#[tokio::test]
-async fn dependencies_that_cannot_be_are_refused() {
+async fn dependencies_and_runs_that_cannot_be_are_refused() {
     let queue = Queue::new().await;
     let (run_id, _) = queue.run(&jobs(Chunk, 1)).await;
-    let (_, elsewhere) = queue.run(&jobs(Chunk, 1)).await;
     let mut connection = queue.pool.acquire().await.unwrap();
     let on_itself = [job(Chunk, json!(0)).depends_on([0])];
     let refused = queue::enqueue_many(&mut connection, run_id, &on_itself).await;
     assert!(matches!(refused, Err(queue::Error::DependencyNotEarlier { index: 0, depends_on: 0 })));
-    let across_runs = NewJob { depends_on: &elsewhere, ..NewJob::new(run_id, &Chunk(json!(0))).unwrap() };
-    let refused = queue::enqueue(&mut connection, &across_runs).await;
-    assert!(matches!(refused, Err(queue::Error::NoSuchDependency { found: 0, expected: 1, .. })));
-    let nowhere = NewJob::new(queue::RunId(uuid::Uuid::nil()), &Chunk(json!(0))).unwrap();
-    assert!(matches!(queue::enqueue(&mut connection, &nowhere).await, Err(queue::Error::NoSuchRun(_))));
+    let nowhere = queue::RunId(uuid::Uuid::nil());
+    let refused = queue::enqueue_many(&mut connection, nowhere, &jobs(Chunk, 1)).await;
+    assert!(matches!(refused, Err(queue::Error::NoSuchRun(_))));
 }
 
 #[tokio::test]
@@ -140,7 +121,7 @@ async fn an_outcome_that_the_database_refuses_is_a_failed_attempt() {
         let bad = Artefact { blake3: "not a hash".into(), ..artefact("index", "key".into(), false) };
         Ok(Outcome::default().artefact(bad))
     });
-    let (run_id, _) = queue.run(&[job(Build, json!(null)).max_attempts(1)]).await;
+    let (run_id, _) = queue.run(&[ChildJob { max_attempts: 1, ..job(Build, json!(null)) }]).await;
     let _worker = queue.worker().handler(handler).start(CancellationToken::new());
     let status = queue.wait_for_run(run_id, RunState::Failed).await;
     assert!(status.error_detail.unwrap().contains("artefacts_blake3_check"));

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use queue::{JobContext, JobId, Outcome, RunState};
+use queue::{ChildJob, JobContext, JobId, Outcome, RunState};
 use serde_json::json;
 use testkit::postgres::TestDatabase;
 use tokio_util::sync::CancellationToken;
@@ -57,7 +57,8 @@ async fn a_database_that_crashes_under_load_loses_no_job_and_no_worker() {
         }
         Ok(Outcome::default())
     });
-    let mut chunks: Vec<_> = jobs(Chunk, 600).into_iter().map(|job| job.max_attempts(10)).collect();
+    let mut chunks: Vec<_> =
+        jobs(Chunk, 600).into_iter().map(|job| ChildJob { max_attempts: 10, ..job }).collect();
     chunks.push(job(Chunk, json!(null)).depends_on(0..600));
     let (run_id, _) = queue.run(&chunks).await;
     let shutdown = CancellationToken::new();

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use queue::{Completion, NewJob, Settled};
+use queue::{Completion, Settled};
 use serde_json::json;
 
 use crate::leases::lease;
@@ -14,25 +14,17 @@ const AT_ONCE: Duration = Duration::from_secs(5);
 #[tokio::test]
 async fn an_open_transaction_that_has_enqueued_keeps_nobody_waiting() {
     let queue = Queue::new().await;
-    let (run_id, ids) = queue.run(&jobs(Chunk, 4)).await;
+    let (run_id, _) = queue.run(&jobs(Chunk, 4)).await;
     let mut open = queue.pool.begin().await.unwrap();
     let other_run = queue::enqueue_run(&mut open, &new_run(queue.project)).await.unwrap();
     queue::enqueue_many(&mut open, other_run, &jobs(Chunk, 3)).await.unwrap();
-    // Into a run that others use as well, and depending on jobs that are being claimed.
-    queue::enqueue(&mut open, &NewJob::new(run_id, &Chunk(json!(0))).unwrap()).await.unwrap();
-    queue::enqueue(&mut open, &NewJob { depends_on: &ids, ..NewJob::new(run_id, &Merge(json!(1))).unwrap() })
-        .await
-        .unwrap();
+    // Into a run that others use as well, and whose jobs are being claimed.
+    let more = [job(Chunk, json!(0)), job(Merge, json!(1)).depends_on([0])];
+    queue::enqueue_many(&mut open, run_id, &more).await.unwrap();
 
     tokio::time::timeout(AT_ONCE, async {
         let mut second = queue.pool.begin().await.unwrap();
-        queue::enqueue(&mut second, &NewJob::new(run_id, &Chunk(json!(2))).unwrap()).await.unwrap();
-        queue::enqueue(
-            &mut second,
-            &NewJob { depends_on: &ids, ..NewJob::new(run_id, &Merge(json!(3))).unwrap() },
-        )
-        .await
-        .unwrap();
+        queue::enqueue_many(&mut second, run_id, &more).await.unwrap();
         second.commit().await.unwrap();
         queue.run(&jobs(Chunk, 1)).await;
 
@@ -65,7 +57,7 @@ async fn jobs_complete_while_a_job_is_being_added_to_their_run_but_the_run_does_
     let (run_id, _) = queue.run(&jobs(Chunk, 2)).await;
     let claimed = queue.claim("chunk", 2).await;
     let mut open = queue.pool.begin().await.unwrap();
-    queue::enqueue(&mut open, &NewJob::new(run_id, &Late(json!(0))).unwrap()).await.unwrap();
+    queue::enqueue_many(&mut open, run_id, &jobs(Late, 1)).await.unwrap();
 
     let mut connection = queue.pool.acquire().await.unwrap();
     let (first, completion) = (lease(&claimed[0]), Completion::default());

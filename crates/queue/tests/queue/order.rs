@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use queue::{Completion, ProjectId};
+use queue::{ChildJob, Completion, ProjectId};
 use serde_json::json;
 use uuid::Uuid;
 
@@ -12,7 +12,7 @@ use crate::support::{Chunk, Queue, job, jobs};
 #[tokio::test]
 async fn higher_priorities_go_first_and_equals_in_the_order_of_enqueueing() {
     let queue = Queue::new().await;
-    let job = |name: &str, priority| job(Chunk, json!(name)).priority(priority);
+    let job = |name: &str, priority| ChildJob { priority, ..job(Chunk, json!(name)) };
     queue.run(&[job("low", -5), job("first", 0), job("second", 0), job("high", 7)]).await;
     let mut order = Vec::new();
     for _ in 0..4 {

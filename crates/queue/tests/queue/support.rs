@@ -129,7 +129,6 @@ macro_rules! kinds {
 }
 
 kinds! {
-    After = "after",
     Build = "build",
     Chunk = "chunk",
     Cursed = "cursed",
@@ -139,7 +138,6 @@ kinds! {
     Late = "late",
     Merge = "merge",
     Nothing = "nothing",
-    Other = "other",
     Patient = "patient",
     Plan = "plan",
     Poison = "poison",
