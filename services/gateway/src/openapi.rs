@@ -19,8 +19,9 @@ const KEY: &str = "api_key";
         title = "Marey",
         description = "Full-body motion from a few control points, bodies and their motion from a few cameras, and poses by \
                        inverse kinematics.\n\nMake a session, upload its control points, run it on a motion database, \
-                       download the motion; or upload what calibrated cameras saw, run it, download the body. All `/v1` paths need `Authorization: Bearer mk_…`. Errors \
-                       are problem details (RFC 9457). Lists are paged: give `next` back as `cursor`.",
+                       download the motion; or upload what calibrated cameras saw, run it, download the body. \
+                       All `/v1` paths need `Authorization: Bearer mk_…`. Errors are problem details (RFC 9457). \
+                       Lists are paged: give `next` back as `cursor`.",
         license(name = "Apache-2.0", identifier = "Apache-2.0"),
     ),
     components(schemas(Problem)),
