@@ -47,9 +47,7 @@ fn role_schema() -> openapi::Object {
 
 /// Those of files of sessions.
 pub(crate) fn session_role_schema() -> openapi::Object {
-    let mut schema = words_schema(FileRole::session_roles());
-    schema.description = Some(format!("which files have which role: {}", FileRole::session_endings()));
-    schema
+    words_schema(FileRole::session_roles())
 }
 
 fn words_schema(roles: impl IntoIterator<Item = FileRole>) -> openapi::Object {

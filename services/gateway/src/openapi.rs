@@ -17,10 +17,11 @@ const KEY: &str = "api_key";
 #[openapi(
     info(
         title = "Marey",
-        description = "Full-body motion from a few control points, bodies from a few cameras.\n\nMake a session, upload its \
-                       control points, run it on a motion database, download the motion; or upload what calibrated cameras \
-                       saw, run it, download the body. All `/v1` paths need `Authorization: Bearer mk_…`. Errors \
-                       are problem details (RFC 9457). Lists are paged: give `next` back as `cursor`.",
+        description = "Full-body motion from a few control points, bodies and their motion from a few cameras, and poses by \
+                       inverse kinematics.\n\nMake a session, upload its control points, run it on a motion database, \
+                       download the motion; or upload what calibrated cameras saw, run it, download the body. \
+                       All `/v1` paths need `Authorization: Bearer mk_…`. Errors are problem details (RFC 9457). \
+                       Lists are paged: give `next` back as `cursor`.",
         license(name = "Apache-2.0", identifier = "Apache-2.0"),
     ),
     components(schemas(Problem)),
@@ -28,7 +29,8 @@ const KEY: &str = "api_key";
         (name = "sessions", description = "A capture session: one take of one performer, and its files"),
         (name = "files", description = "What was uploaded to a session"),
         (name = "motion databases", description = "Recorded motion to learn from: named, versioned, immutable once built"),
-        (name = "body models", description = "Bodies that people may have, learned from scans: named, versioned, immutable once built"),
+        (name = "body models", description = "Body shapes, learned from registered scans (`shipped`: from bodies of a \
+                                              generator): named, versioned, immutable once built"),
         (name = "runs", description = "Work that was asked for, its progress and its results"),
         (name = "live", description = "Motion while it happens, on a WebSocket"),
         (name = "me", description = "Who you are to this server"),

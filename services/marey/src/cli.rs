@@ -46,7 +46,7 @@ enum Command {
     /// Build and manage motion databases: the recordings that Marey learns from
     #[command(subcommand)]
     Db(database::Command),
-    /// Learn and manage body models: the shapes that people's bodies have
+    /// Learn and manage body models: the body shapes that Marey can fit (the shipped one: generated bodies, MakeHuman)
     #[command(subcommand)]
     Body(body::Command),
     Upload(upload::Args),

@@ -115,7 +115,7 @@ fn show(client: &Client, given: Option<HeldOut>, folder: &Path, output: &Path) -
 
 /// Draws recordings; those of an earlier demo were the same.
 fn draw_trials(folder: &Path) -> anyhow::Result<PathBuf> {
-    println!("Drawing {NUM_SAMPLES} synthetic trials: walking, running, jumping and boxing");
+    println!("Making {NUM_SAMPLES} synthetic trials: walking, running, jumping and boxing");
     remove(folder)?;
     Trials { count: NUM_SAMPLES, seed: 1, action: None, frames: 240, points: None }.write(folder)?;
     Ok(folder.to_owned())

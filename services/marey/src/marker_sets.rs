@@ -38,7 +38,8 @@ pub struct Args {
     /// New file to write a marker map to, for editing
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
-    /// Axis of the file that points up: x, y or z [default: what the file says, else y for TRC, z for C3D]
+    /// Axis of the file that points up: x, y or z [default: what the file says, else z for C3D, y for TRC
+    /// and CSV]
     #[arg(long, value_name = "AXIS")]
     up: Option<Axis>,
     /// List the known marker sets

@@ -39,7 +39,7 @@ pub struct Args {
     /// session's files; required if it has both control points and cameras]
     #[arg(long, value_parser = PossibleValuesParser::new(gateway::session_run_kinds()))]
     kind: Option<String>,
-    /// Any other parameter of the method; may be given several times
+    /// Any other parameter: of points, see docs/methods.md; of cameras, see docs/multiview.md; may be given several times
     #[arg(long = "set", value_name = "NAME=VALUE")]
     parameters: Vec<String>,
     /// Show the progress and wait for the end
@@ -71,8 +71,8 @@ struct PointsArgs {
     /// What the names of the performer's markers begin with, if the file has several people, such as Anna:
     #[arg(long, value_name = "PREFIX")]
     prefix: Option<String>,
-    /// Axis of the file of points, or of the calibration, that points up: x, y or z [default: as the file says, else z for C3D
-    /// and y for the others]
+    /// Axis of the file of points, or of the calibration, that points up: x, y or z [default: as the file says; else for points z
+    /// (C3D) or y, for a calibration what its format and the cameras say]
     #[arg(long, value_name = "AXIS")]
     up: Option<Axis>,
 }

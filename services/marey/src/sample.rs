@@ -17,9 +17,9 @@ const NUM_SUBJECTS: u32 = 4;
 
 /// Write synthetic recordings to try things with
 ///
-/// Draws trials from a small statistical model of human motion and writes them as ASF and AMC. They are synthetic: good for
+/// Samples trials from a small statistical model of human motion and writes them as ASF and AMC. They are synthetic: good for
 /// trying things, not for measuring how well real motion is reconstructed. Performers keep their names, so trials of several
-/// seeds may go into one folder: seed 1 draws synthetic1 to synthetic4, seed 2 synthetic2 to synthetic5, and so on. Existing
+/// seeds may go into one folder: seed 1 makes synthetic1 to synthetic4, seed 2 synthetic2 to synthetic5, and so on. Existing
 /// files with other content are kept.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -33,7 +33,7 @@ pub struct Args {
     /// How many trials
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     count: u32,
-    /// A different seed draws different trials; the same seed draws the same ones
+    /// A different seed makes different trials; the same seed makes the same ones
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// walk, run, jump or boxing [default: all in turn]

@@ -31,9 +31,9 @@ const STATURES_M: [f64; 5] = [1.58, 1.66, 1.73, 1.79, 1.86];
 
 /// Write a synthetic multi-camera capture to try things with
 ///
-/// A body of the shipped model moves as in a drawn trial, inside a ring of cameras. The calibration, a silhouette for each frame
-/// and camera, and the true joints and meshes are written. All of it is synthetic: the body is one that the model knows, and its
-/// silhouettes are exact.
+/// A body of the shipped model (made of bodies of the generator MakeHuman, not of people) moves as in a synthetic trial, inside a
+/// ring of cameras. The calibration, a silhouette for each frame and camera, and the true joints and meshes are written. All of
+/// it is synthetic: the body is one that the model knows, and its silhouettes are exact.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   marey sample-capture --out capture/ --frames 24
@@ -52,7 +52,7 @@ pub struct Args {
     /// walk, run, jump or boxing
     #[arg(long, default_value = "walk")]
     action: Action,
-    /// A different seed draws a different person and motion; the same seed draws the same ones
+    /// A different seed makes a different person and motion; the same seed makes the same ones
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }

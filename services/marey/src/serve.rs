@@ -14,7 +14,7 @@ May be set:
   MAREY_LISTEN                address to listen on
   MAREY_WORKER_CONCURRENCY    jobs at once [default: number of cores]; 0 answers calls only
   MAREY_WORKER_NAME           name in the queue and in run.json
-  MAREY_DATABASE_CONNECTIONS  most connections to PostgreSQL, beside three of the worker [default: 8]
+  MAREY_DATABASE_CONNECTIONS  PostgreSQL connections, besides three of the worker [default: 8]
   MAREY_SHUTDOWN_GRACE_SECS   time for calls and jobs after a signal [default: 20]
   MAREY_DATABASE_CACHE_BYTES  what was learned and is kept in memory [default: 2 GiB]
   MAREY_MAX_OBJECT_BYTES      largest object read into memory [default: 1 GiB]

@@ -50,7 +50,7 @@ impl Handler for PlanHandler {
             };
             let mut evidence = inputs::read(&files, &selection, prior.database.skeleton())?;
             if is_synthetic(prior.database.skeleton()) {
-                evidence.warnings.push("the motion database is synthetic: drawn, not recorded".to_owned());
+                evidence.warnings.push("the motion database is synthetic, not recorded".to_owned());
             }
             let frames = evidence.session.num_frames();
             if frames > limit {

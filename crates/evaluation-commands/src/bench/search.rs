@@ -25,7 +25,7 @@ use questions::Run;
 #[command(after_help = "\
 exact, cold       every window considered
 exact, tracking   the same, the successors of the last frame's matches first
-fast, cold        lists of windows near to the query
+fast, cold        windows near the query
 fast, tracking    from the last frame's matches along the neighbour graph
 recall            share of the exact search's windows that were found
 

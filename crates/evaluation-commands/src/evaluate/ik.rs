@@ -19,12 +19,12 @@ use crate::{motions, progress::Progress};
 /// `marey evaluate ik`
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Motion drives the body model, which is drawn into two cameras. For arms of boxers and legs of walkers the \
+Motion drives the body model, which is rendered for two cameras. For arms of boxers and legs of walkers the \
 solver is given the shoulders and wrists, or hips and ankles, and the silhouettes; the elbows and knees found are compared with \
 the true ones.
 
 Motion must be on the CMU skeleton, ASF+AMC or BVH, also .zst; the skeleton of an AMC file is looked for beside it. Without any, \
-motion is drawn from the sample motion that comes with Marey: it is synthetic.
+motion is sampled from the model of motion that comes with Marey: it is synthetic.
 
 Examples:
   marey evaluate ik --frames 20
@@ -109,7 +109,7 @@ struct Json {
     trials: Vec<Trials>,
     /// trials that widths and weights were tuned on; `--data` leaves them out
     tuned_on: [&'static str; 2],
-    /// whether motion was drawn from the sample motion, not recorded
+    /// whether motion was sampled, not recorded
     synthetic: bool,
     seconds: f64,
 }
@@ -293,10 +293,14 @@ fn print(json: &Json) {
     }
     if json.synthetic {
         println!(
-            "\nThe motion is synthetic: its figures say nothing about recorded motion and are not comparable with the paper's."
+            "\nThe motion is synthetic, and the body is of a generator (MakeHuman): these figures say nothing about recorded motion of \
+             people and are not comparable with the paper's."
         );
     } else {
         let tuned_on = TUNED_ON.join(" and ");
-        println!("\nThe paper's figures are of HumanEva. Widths and weights were tuned on {tuned_on}.");
+        println!(
+            "\nThe motion is recorded, and the body is of a generator (MakeHuman). The paper's figures are of HumanEva. Widths and \
+             weights were tuned on {tuned_on}."
+        );
     }
 }

@@ -142,6 +142,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         alpha: found.alpha.clone(),
     };
     let report = Report::new(joints, reports, &run.times, settings);
+    if args.model.is_none() {
+        println!("{}", shape::SHIPPED);
+    }
     report.print();
     if let Some(path) = &args.json {
         write(path, serde_json::to_vec_pretty(&report)?)?;

@@ -13,20 +13,20 @@ use model::{counted, shown};
 use tracking::built_in_poses;
 use vision::scene::Ring;
 
-use super::written::write;
+use super::{shape, written::write};
 use crate::progress::Progress;
 use poses::{Part, Poses};
 pub(super) use poses::{TRAINING_POSES, poses};
 use report::{Cell, Json};
 
-/// Pixels of the cameras: particles are drawn smaller anyway.
+/// Pixels of the cameras: particles are rendered smaller anyway.
 const SIZE: u32 = 502;
 const FOCAL: f64 = 663.0;
 
 /// `marey evaluate recovery`
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Bodies are drawn in poses of recorded people, as a ring of cameras would see them. Then limbs are turned by some degrees in each \
+Bodies are rendered in poses of recorded people, as a ring of cameras would see them. Then limbs are turned by some degrees in each \
 angle, and every way to find the pose again starts from there: local optimisation alone, one particle search over the turned limbs \
 with and without the prior, and all that Marey does in a frame. Found means that all joints are within 50 mm of the truth.
 
@@ -133,7 +133,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     bar.finish();
     let table =
         report::table(&found, format!("{note}; {}, {noise} silhouettes", counted(cameras.len(), "camera")));
-    println!("{}\n{}\n\n{}", table.title, table.note, table.text().trim_end());
+    println!("{}\n{}\n{}\n\n{}", shape::SHIPPED, table.title, table.note, table.text().trim_end());
     report::print_claim(&found);
     if let Some(path) = &args.json {
         let json = Json {

@@ -31,7 +31,7 @@ use super::{
 DIR holds calibration.json (or .yml, .toml, …), silhouettes/CAMERA/0000.png, groundtruth/mesh_0000.ply and groundtruth/joints.json; \
 images/CAMERA/0000.jpg, where there are any, are the background of the overlays.
 
-With --scans, people whose registered scans are known are drawn as 8 cameras would see them, and found again by a model that was \
+With --scans, bodies whose registered scans are known are rendered as 8 cameras would see them, and found again by a model that was \
 learned without them: in the base pose and in 5 others.
 
 Examples:
@@ -65,7 +65,7 @@ pub struct Args {
     /// skin_weights.npy there or in ../rig
     #[arg(long, value_name = "DIR")]
     scans: Option<PathBuf>,
-    /// How many people are left out, one after the other
+    /// How many bodies are left out, one after the other
     #[arg(long, value_name = "N", default_value_t = 20, requires = "scans")]
     leave_one_out: usize,
 }
@@ -118,6 +118,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let found = found.with_context(|| format!("frame {} of {}", args.frame, folder.display()))?;
     let errors = shape_errors(&body_of(&model, &found), &truth)
         .context("the true mesh has no surface, or none of its joints has the name of one of the model's")?;
+    if args.model.is_none() {
+        println!("{SHIPPED}");
+    }
     print(&errors, &found, seconds);
     if let Some(folder) = &args.overlay {
         overlays(folder, &capture, args.frame, &views, &found)?;
@@ -139,6 +142,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What figures begin with where the body model is the one that comes with Marey.
+pub(super) const SHIPPED: &str = "the shipped model's bodies are of a generator (MakeHuman), not of people";
+
 pub(super) fn model(file: Option<&PathBuf>) -> anyhow::Result<BodyModel> {
     let Some(file) = file else { return Ok(BodyModel::shipped()) };
     let bytes = fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
@@ -158,7 +164,7 @@ fn print(errors: &ShapeErrors, found: &Fit, seconds: f64) {
     row("surface, std", errors.surface_std_mm, "16.16 mm");
     row("joints, mean", errors.joint_mean_mm, "");
     row("joints, largest", errors.joint_max_mm, "");
-    row("stature", errors.stature_error_mm, "");
+    row("height", errors.stature_error_mm, "");
     let views = found.views.iter().map(|view| format!("{} {:.3}", view.camera, view.iou));
     println!("overlap              {}", views.collect::<Vec<_>>().join(", "));
     println!("confidence           {:.2}, {seconds:.1} s", found.confidence);

@@ -35,7 +35,7 @@ pub struct Outcome<'a> {
     pub rows: &'a [Row],
     /// trials that the defaults were tuned on, when these are others
     pub tuning: &'a [String],
-    /// whether any of the motion was drawn from the sample motion, not recorded
+    /// whether any of the motion was sampled, not recorded
     pub synthetic: bool,
     /// how long it took
     pub seconds: f64,
@@ -54,7 +54,7 @@ struct Json<'a> {
     database_poses: usize,
     tuning_trials: &'a [String],
     tested_trials: Vec<&'a str>,
-    /// whether any of the motion was drawn from the sample motion, not recorded
+    /// whether any of the motion was sampled, not recorded
     synthetic: bool,
     trials: &'a [TrialResult],
 }

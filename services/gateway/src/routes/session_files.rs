@@ -8,7 +8,13 @@ use axum::{
 };
 use formats::FileRole;
 use serde::Deserialize;
-use utoipa::IntoParams;
+use utoipa::{
+    IntoParams,
+    openapi::{
+        Required,
+        path::{Parameter, ParameterBuilder, ParameterIn},
+    },
+};
 use uuid::Uuid;
 
 use super::download::{self, Object};
@@ -23,15 +29,30 @@ use crate::{
     upload::Announced,
 };
 
-/// What the file is for.
-#[derive(Debug, Deserialize, IntoParams)]
+/// What is said about an uploaded file.
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[into_params(parameter_in = Query)]
 pub(crate) struct PutQuery {
-    /// guessed from the name when left out: `.bvh` counts as ground truth, archives as masks, or as images or plates if
-    /// their name says so
-    #[param(schema_with = files::session_role_schema)]
+    /// what the file is for
     role: Option<FileRole>,
+}
+
+// the derived implementation has no text where a schema is given
+impl IntoParams for PutQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let text = format!(
+            "What the file is for; guessed from the name when left out, where `.bvh` counts as ground truth and archives as \
+             masks, or as images or plates if their name says so. Files of each role: {}",
+            FileRole::session_endings()
+        );
+        let role = ParameterBuilder::new()
+            .name("role")
+            .parameter_in(ParameterIn::Query)
+            .required(Required::False)
+            .description(Some(text))
+            .schema(Some(files::session_role_schema()));
+        vec![role.build()]
+    }
 }
 
 /// List the files of a session

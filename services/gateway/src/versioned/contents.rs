@@ -72,7 +72,7 @@ pub(crate) struct Share {
 pub(crate) struct Augment {
     /// every clip with left and right exchanged
     mirror: bool,
-    /// every clip at these speeds
+    /// every clip at these multiples of its recorded speed
     #[schema(example = json!([0.8, 1.25]))]
     warps: Vec<f64>,
 }
@@ -143,8 +143,7 @@ pub(crate) async fn gplvm(db: &mut PgConnection, database: &MotionDatabase) -> R
     .await?;
     let (store_key, blake3) = found.ok_or_else(|| {
         Error::Conflict(format!(
-            "no GPLVM has been trained on motion database {0}; train it first: marey db train {0} \
-             (POST /v1/motion-databases/{0}/train)",
+            "no GPLVM has been trained on motion database {0}; train it first (marey db train {0})",
             database.version()
         ))
     })?;

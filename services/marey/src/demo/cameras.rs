@@ -36,7 +36,7 @@ pub struct Followed {
 
 /// Draws a capture, has it tracked, and compares the joints with the true ones.
 pub fn show(client: &Client, folder: &Path, output: &Path) -> anyhow::Result<Followed> {
-    println!("Drawing a walk in front of {} cameras: silhouettes, nothing else", CAPTURE.cameras);
+    println!("Rendering a walk in front of {} cameras: silhouettes, nothing else", CAPTURE.cameras);
     let capture = folder.join("sample-capture");
     remove(&capture)?;
     CAPTURE.write(&capture, || ())?;

@@ -11,7 +11,7 @@ use super::{
 };
 use model::counted;
 
-/// What drawn motion must come to: far above what it does come to, far below what a broken step would.
+/// What synthetic motion must come to: far above what it does come to, far below what a broken step would.
 const MOST_ANGLES_DEG: f64 = 10.0;
 const MOST_POSITIONS_CM: f64 = 3.0;
 const MOST_JOINTS_M: f64 = 0.03;
@@ -24,7 +24,7 @@ const LINES: usize = 10;
 /// What was done and what came of it.
 #[derive(Debug)]
 pub struct Summary {
-    /// whether the trials were drawn
+    /// whether the trials are synthetic
     pub is_synthetic: bool,
     /// trials that were learned from
     pub num_learned: usize,
@@ -123,7 +123,7 @@ impl Summary {
              from {learned} of the same people.\n"
         );
         if self.is_synthetic {
-            out.push_str("  All of it is drawn from a statistical model; recorded motion is harder: see docs/accuracy.md.\n");
+            out.push_str("  All of it is sampled from a statistical model; recorded motion is harder: see docs/accuracy.md.\n");
         }
         let _ = write!(
             out,
@@ -137,9 +137,10 @@ impl Summary {
     fn cameras_part(&self) -> String {
         let Followed { num_frames, mean_m, largest_m, carried_m, stature_m } = self.followed;
         format!(
-            "\nFROM {} CAMERAS: a man followed by his silhouettes alone, {num_frames} frames\n  \
+            "\nFROM {} CAMERAS: a synthetic man (a body of the generator MakeHuman) followed by his silhouettes alone, \
+             {num_frames} frames\n  \
              Joints are off by {:.1} cm on average, {:.1} cm at most (his first pose, moved along rigidly: {:.1} cm on average);\n  \
-             stature {stature_m:.2} m, in truth {:.2} m. He is synthetic, and one that the body model knows: real people are harder.\n",
+             stature {stature_m:.2} m, in truth {:.2} m. His body is one that the model knows: real people are harder.\n",
             cameras::CAPTURE.cameras,
             100.0 * mean_m,
             100.0 * largest_m,
@@ -175,7 +176,7 @@ impl Summary {
             ),
             (
                 format!("{shown}/motion.bvh"),
-                "the same in Blender: File > Import > Motion Capture (.bvh), Scale 0.01; truth.bvh is beside it",
+                "in Blender: File > Import > Motion Capture (.bvh), Scale 0.01; beside it: truth.bvh",
             ),
             (format!("{cameras}/overlay_cam0.mp4"), "the body that was found, over what a camera saw"),
             (format!("{cameras}/body.glb"), "that body, moving, in Blender: File > Import > glTF 2.0"),

@@ -93,7 +93,7 @@ fn synthetic(model: &BodyModel, part: Part, starts: usize, seed: u64) -> anyhow:
             drawer.draw(action, seed.wrapping_add(first + trial), &options)
         })
         .collect::<Result<Vec<_>, _>>()
-        .context("cannot draw synthetic motion")?;
+        .context("cannot make synthetic motion")?;
     let named: Vec<_> = motions.iter().map(|motion| ("synthetic motion", motion)).collect();
     let drawn = chosen(&recorded_poses(model, &named)?, starts)?;
     Ok(Poses { drawn, prior: None, note: "bodies in poses of synthetic motion, built-in prior".to_owned() })

@@ -1,4 +1,4 @@
-//! People whose scans are known, drawn and found again by a model that was learned without them.
+//! Bodies whose scans are known, rendered and found again by a model that was learned without them.
 
 use std::{path::Path, time::Instant};
 
@@ -142,7 +142,7 @@ fn report(cases: &[Case], people: usize, views: usize, args: &Args) -> anyhow::R
         row("surface, mm", summary.surface_mean_abs_mm);
         row("surface std, mm", summary.surface_std_mm);
         row("joints, mm", summary.joint_mean_mm);
-        row("stature, mm", summary.stature_error_mm);
+        row("height, mm", summary.stature_error_mm);
         row("seconds", summary.seconds);
         println!("{name:<11}{:<17}{:>7.1} %", "found", 100.0 * summary.found);
     }
