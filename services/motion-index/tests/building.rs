@@ -205,7 +205,7 @@ async fn uploads_that_are_no_motion_fail_the_build_and_say_why() {
             "8 frames",
         ),
         ("index.tar", tar(&[("index.csv", b"a,b\n1,2\n"), ("7_01.amc", amc.as_bytes())]), "index.csv"),
-        ("empty.zip", Vec::new(), "empty.zip: found a file that is no archive with files in it"),
+        ("empty.zip", Vec::new(), "found a file that is no archive with files in it"),
         ("damaged.tar.zst", b"\x28\xb5\x2f\xfd\x00rest".to_vec(), "damaged.tar.zst"),
     ];
     for (name, content, expected) in cases {
