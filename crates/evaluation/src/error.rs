@@ -61,8 +61,17 @@ pub enum Error {
         /// name of the recording
         name: String,
         /// what is wrong
-        source: inverse_kinematics::Error,
+        source: Box<Self>,
     },
+    /// A recorded skeleton, or a body's rig, without a joint that is needed.
+    #[error("the skeleton has no joint {name}, expected one of the CMU skeleton")]
+    MissingJoint {
+        /// name of the joint
+        name: &'static str,
+    },
+    /// A chain that cannot be made or solved.
+    #[error(transparent)]
+    InverseKinematics(#[from] inverse_kinematics::Error),
     /// Poses of a database that make no motion.
     #[error("{name}: {source}")]
     Motion {
