@@ -72,6 +72,14 @@ pub enum Error {
     /// A chain that cannot be made or solved.
     #[error(transparent)]
     InverseKinematics(#[from] inverse_kinematics::Error),
+    /// There is no surface to measure to.
+    #[error("the mesh has {faces} faces and an area of {area_m2} m², expected a surface")]
+    NoSurface {
+        /// faces of the mesh
+        faces: usize,
+        /// their area, square metres
+        area_m2: f64,
+    },
     /// Poses of a database that make no motion.
     #[error("{name}: {source}")]
     Motion {

@@ -4,7 +4,8 @@
 //! - [`foot_slide`], [`Calibration`]: whether standing feet stand, and whether errors are as large as stated.
 //! - [`evaluate_sparse`]: trials reconstructed from their own control points, by [`Protocol`], in every case of a [`Sweep`]:
 //!   methods, windows, sizes of the database, noise, gaps.
-//! - [`shape_errors`]: how far a body found in silhouettes is from the true one; [`Distribution`] over many.
+//! - [`shape_errors`]: how far a body found in silhouettes is from the true one, by distances of [`surface`]s; [`Distribution`]
+//!   over many.
 //! - [`Recording`]: recorded motion on the morphable body.
 //! - [`limbs`]: where inverse kinematics finds elbows and knees; [`recovery`]: how often a particle search finds a disturbed
 //!   pose again, with the [`training_poses`] of its prior.
@@ -33,6 +34,7 @@ mod sparse_evaluation;
 mod sparse_protocol;
 mod subset;
 mod summary;
+pub mod surface;
 pub mod tables;
 pub mod training_poses;
 mod truth;
