@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # References that code and documents make must lead somewhere: every docs/NAME.md, every docs/NAME.md#section
-# and every `crates/…` or `services/…` path that is named exists, and nothing refers to documents or
-# numberings that are not in the repository. With --self-test it first shows that it finds what it looks for.
+# and every `crates/…` or `services/…` path that is named exists, nothing refers to documents or numberings
+# that are not in the repository, and comments that name a paper say where docs/papers.md has it. With --self-test
+# it first shows that it finds what it looks for.
 set -euo pipefail
 shopt -s inherit_errexit
 cd "$(dirname "$0")/.."
@@ -9,6 +10,9 @@ cd "$(dirname "$0")/.."
 # Short names of papers and sections of notes that only their authors have; docs/papers.md is what may be named.
 dangling='method(\.md)? §|design(\.md)? §|\bmends? [0-9]|\bMM (eq\.|§)|\bIK eq\.|\bIBIK\b'
 dangling+='|\bLR(-zh)?,? (eq\.|table|[0-9])|\bLR-zh\b|\(LR\)|\b[Tt]he Chinese paper\b'
+
+# A comment that names a paper: `(Baran and Popović 2007`, `Prati et al. 2003`, `Ericson, 2005`.
+citation='//.*\b[A-Z][^ .]+( et al\.)?,? (19[5-9]|20[0-2])[0-9]\b'
 
 # Prints the anchors of the headings of a Markdown file.
 anchors() {
@@ -47,6 +51,23 @@ without_document() {
     grep -nHE "$dangling" "$@" | sed 's/$/   <- refers to no document of the repository; see docs\/papers.md/' || true
 }
 
+# Prints each line of a Rust file that names a paper by its year, where the whole file leads to none of docs/papers.md.
+unanchored() {
+    local file
+    (grep -lE "$citation" "$@" || true) | (grep -E '\.rs$' || true) | while IFS= read -r file; do
+        grep -qF 'docs/papers.md' "$file" ||
+            grep -nHE "$citation" "$file" | sed 's/$/   <- names a paper without its section of docs\/papers.md/'
+    done
+}
+
+# Prints all that is wrong with the files given.
+wrong() {
+    broken "$@"
+    missing "$@"
+    without_document "$@"
+    unanchored "$@"
+}
+
 self_test() {
     local dir line
     dir=$(mktemp -d)
@@ -54,7 +75,7 @@ self_test() {
     trap "rm -rf '$dir'" EXIT
     while IFS= read -r line; do
         printf '%s\n' "$line" >"$dir/lib.rs"
-        [[ -n $(broken "$dir/lib.rs")$(missing "$dir/lib.rs")$(without_document "$dir/lib.rs") ]] ||
+        [[ -n $(wrong "$dir/lib.rs") ]] ||
             { echo "references self-test: did not find: $line" >&2; exit 1; }
     done <<'WRONG'
 /// see docs/no-such-page.md
@@ -66,16 +87,18 @@ self_test() {
 /// table 1 of Mousas et al. (LR)
 /// Frames a second that the Chinese paper prints
 /// see `crates/no-such-crate/src/lib.rs`
+/// Heat from the bones (Baran and Popović 2007, section 4)
+//! darker colours (Prati et al. 2003)
 WRONG
-    printf '/// (docs/papers.md#local-regression, eq. 10; docs/papers.md; `crates/model`)\n' >"$dir/lib.rs"
-    [[ -z $(broken "$dir/lib.rs")$(missing "$dir/lib.rs")$(without_document "$dir/lib.rs") ]] ||
+    printf '/// (Chai 2005; docs/papers.md#local-regression, eq. 10; docs/papers.md; `crates/model`)\n' >"$dir/lib.rs"
+    [[ -z $(wrong "$dir/lib.rs") ]] ||
         { echo "references self-test: found something in a right reference" >&2; exit 1; }
 }
 
 [[ ${1:-} == --self-test ]] && self_test
 
 mapfile -t files < <(git ls-files '*.rs' '*.md' '*.proto' '*.sql' '*.toml' '*.sh' ':!scripts/check-references.sh')
-found=$(broken "${files[@]}"; missing "${files[@]}"; without_document "${files[@]}")
+found=$(wrong "${files[@]}")
 if [[ -n $found ]]; then
     printf '%s\n' "$found" >&2
     exit 1

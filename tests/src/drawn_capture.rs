@@ -6,8 +6,8 @@ use std::{fs, path::Path};
 
 use anyhow::Context;
 use body::{BodyModel, Limb, Posed, Shape, Wanted};
+use evaluation::Recording;
 use formats::{image_files, trc};
-use inverse_kinematics::Recording;
 use model::{Camera, Image, PointTrajectories};
 use nalgebra::{Rotation3, Vector2, Vector3};
 use rayon::prelude::*;

@@ -1,5 +1,5 @@
-//! One colour and its spread a pixel, told apart by brightness and colour (Horprasert, Harwood and Davis 1999, "A
-//! statistical approach for real-time robust background subtraction and shadow detection").
+//! One colour and its spread a pixel, told apart by brightness and colour (Horprasert, Harwood and Davis 1999;
+//! docs/papers.md#other-sources).
 //!
 //! A pixel with colour I is compared with its expected colour E in units of the spread σ of each channel: the brightness
 //! distortion α is the factor for which αE is nearest to I, the colour distortion CD the distance left (their equations 5

@@ -1,7 +1,8 @@
 //! Silhouettes from the frames of a camera that stands still: background models, cleaning, and how far to trust the result.
 //!
 //! - [`BackgroundModel`]: a plate or the clip's own colours, compared by brightness and colour (Horprasert, Harwood and
-//!   Davis 1999), or a mixture of Gaussians (Stauffer and Grimson 1999, Zivkovic 2004).
+//!   Davis 1999), or a mixture of Gaussians (Stauffer and Grimson 1999, Zivkovic 2004;
+//!   docs/papers.md#other-sources).
 //! - [`Cleaner`]: morphology on packed bits, holes, and which region is the person.
 //! - [`FrameQuality`], [`CameraQuality`], [`Advice`]: what can be judged without ground truth, and what to do about it.
 //! - [`Segmenter`]: all of it, frame after frame.

@@ -1,6 +1,6 @@
 //! Several Gaussians a pixel, for backgrounds that move: leaves, water, screens (Stauffer and Grimson 1999; Zivkovic 2004,
-//! "Improved adaptive Gaussian mixture model for background subtraction", whose number of modes adapts). Shadows are
-//! darker colours of the same hue as a background mode (Prati et al. 2003).
+//! whose number of modes adapts). Shadows are darker colours of the same hue as a background mode (Prati et al. 2003;
+//! docs/papers.md#other-sources).
 
 use model::Image;
 

@@ -1,5 +1,5 @@
 //! Skinning weights for a template that has none: heat that spreads from the bones over the surface until it rests (Baran and
-//! Popović, *Automatic rigging and animation of 3D characters*, 2007, §4).
+//! Popović 2007, section 4; docs/papers.md#other-sources).
 //!
 //! For joint j: `(−Δ + H) w_j = H p_j`, with the cotangent Laplacian Δ, `H = 1/d²` of the distance d to the nearest bone, and
 //! p_j = 1 where that bone is joint j's. A bone behind the surface is seen; one in front of it belongs to another limb and

@@ -65,7 +65,7 @@ pub use registered::{RegisteredFit, RegisteredOptions, fit_registered};
 pub use regressor::JointRegressor;
 pub use rig::{Dof, DofKind, ROOT_DOFS, Rig, RigJoint};
 pub use rig_json::RigFile;
-pub use scan_files::{ScanOptions, ScanSet, is_scan_file};
+pub use scan_files::{ScanOptions, ScanSet, is_part_of_scan_set};
 pub use shape::{BodyModel, MAX_COMPONENTS, MAX_VERTICES, ModelParts, Shape};
 pub use shipped::{Shipped, shipped};
 pub use skin::Skin;

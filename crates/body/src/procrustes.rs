@@ -18,7 +18,8 @@ impl Rigid {
     }
 }
 
-/// The similarity that brings the first points of pairs nearest to the second, in least squares (Kabsch, Umeyama).
+/// The similarity that brings the first points of pairs nearest to the second, in least squares (Kabsch 1976,
+/// Umeyama 1991; docs/papers.md#other-sources).
 pub fn rigid<'a>(pairs: impl Iterator<Item = (&'a Vector3<f64>, &'a Vector3<f64>)> + Clone) -> Rigid {
     let count = pairs.clone().count().max(1) as f64;
     let (from, to) = pairs

@@ -260,19 +260,6 @@ impl BodyModel {
             }
         }
     }
-
-    /// A body that isn't one of the model's, in the rest pose: a scan itself. Its joints are the regressor's.
-    ///
-    /// # Errors
-    /// [`Error::Model`] if there are not as many vertices as the model has.
-    pub fn shape_of(&self, vertices: Vec<Vector3<f64>>) -> Result<Shape> {
-        if vertices.len() != self.num_vertices() {
-            let what = format!("{} vertices, expected {}", vertices.len(), self.num_vertices());
-            return Err(Error::Model { what });
-        }
-        let joints = self.regressor.joints(&vertices);
-        Ok(Shape { alpha: vec![0.0; self.num_components()], vertices, joints })
-    }
 }
 
 /// A body of one shape in its rest pose.

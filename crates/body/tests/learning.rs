@@ -108,7 +108,7 @@ fn twenty_two_angles_follow_posed_scans_as_far_as_is_known() {
         let scan = data.names.iter().position(|[_, name]| name == pose).unwrap();
         assert!(scan >= 114);
         let base = data.names.iter().position(|[subject, _]| *subject == data.names[scan][0]).unwrap();
-        let shape = model.shape_of(data.scans[base].clone()).unwrap();
+        let shape = scans::shape_of(&model, &data.scans[base]);
         let fit = fit_registered(&model, &shape, &data.scans[scan], &RegisteredOptions::default());
         let mut posed = Posed::default();
         shape.pose(&model, &fit.pose, &mut posed);
@@ -219,8 +219,8 @@ fn weights_of_heat_pose_as_the_given_ones_do() {
         let mut pose = vec![0.0; template.rig.num_dofs()];
         angles.iter().for_each(|(dof, angle)| pose[template.rig.dof_index(dof).unwrap()] = *angle);
         let (mut a, mut b) = (Posed::default(), Posed::default());
-        given.shape_of(template.rest.clone()).unwrap().pose(&given, &pose, &mut a);
-        heat.shape_of(template.rest.clone()).unwrap().pose(&heat, &pose, &mut b);
+        scans::shape_of(&given, &template.rest).pose(&given, &pose, &mut a);
+        scans::shape_of(&heat, &template.rest).pose(&heat, &pose, &mut b);
         let [mean, high] = spread(distances(&a.vertices, &b.vertices));
         println!("{name}: {:.1} mm, 95 % {:.1} mm", mean * 1000.0, high * 1000.0);
         assert!(mean < 0.010 && high < 0.045, "{name}: {mean} {high}");

@@ -143,7 +143,7 @@ fn stream(purpose: &str, trial: &str) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(*hasher.finalize().as_bytes())
 }
 
-/// A draw from the standard normal distribution (Box and Muller 1958).
+/// A draw from the standard normal distribution (Box and Muller 1958; docs/papers.md#other-sources).
 fn normal(chance: &mut ChaCha8Rng) -> f64 {
     let uniform = |bits: u64| ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
     let (radius, angle) = (uniform(chance.next_u64()), uniform(chance.next_u64()));

@@ -61,7 +61,24 @@ pub enum Error {
         /// name of the recording
         name: String,
         /// what is wrong
-        source: inverse_kinematics::Error,
+        source: Box<Self>,
+    },
+    /// A recorded skeleton, or a body's rig, without a joint that is needed.
+    #[error("the skeleton has no joint {name}, expected one of the CMU skeleton")]
+    MissingJoint {
+        /// name of the joint
+        name: &'static str,
+    },
+    /// A chain that cannot be made or solved.
+    #[error(transparent)]
+    InverseKinematics(#[from] inverse_kinematics::Error),
+    /// There is no surface to measure to.
+    #[error("the mesh has {faces} faces and an area of {area_m2} m², expected a surface")]
+    NoSurface {
+        /// faces of the mesh
+        faces: usize,
+        /// their area, square metres
+        area_m2: f64,
     },
     /// Poses of a database that make no motion.
     #[error("{name}: {source}")]

@@ -15,7 +15,7 @@ pub struct Proportion {
     pub tries: usize,
     /// their share
     pub share: f64,
-    /// Wilson's 95 % interval of the share (Wilson 1927)
+    /// Wilson's 95 % interval of the share (Wilson 1927; docs/papers.md#other-sources)
     pub interval: [f64; 2],
 }
 
@@ -42,7 +42,8 @@ impl Proportion {
 pub struct PairedDifference {
     /// share of the first less that of the second
     pub difference: f64,
-    /// its 95 % interval (Agresti and Min 2005: half a case is added to each of the four kinds of pairs)
+    /// its 95 % interval (Agresti and Min 2005; docs/papers.md#other-sources): half a case is added to each of the four kinds
+    /// of pairs
     pub interval: [f64; 2],
     /// cases where only the first succeeded, and only the second
     pub only: [usize; 2],
@@ -100,7 +101,7 @@ mod tests {
 
     #[test]
     fn wilsons_interval_is_as_printed() {
-        // 81 of 263: Newcombe 1998, table I
+        // 81 of 263: Newcombe 1998 (docs/papers.md#other-sources), table I
         let found = Proportion::from_tries((0..263).map(|i| i < 81));
         assert!((found.interval[0] - 0.2553).abs() < 1e-4 && (found.interval[1] - 0.3662).abs() < 1e-4);
         let none = Proportion::from_tries((0..20).map(|_| false));

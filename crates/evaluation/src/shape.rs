@@ -1,7 +1,8 @@
 use model::Mesh;
 use nalgebra::Vector3;
 use serde::Serialize;
-use vision::compare_surfaces;
+
+use crate::surface::compare_surfaces;
 
 /// Points drawn on each surface.
 const SAMPLES: usize = 50_000;

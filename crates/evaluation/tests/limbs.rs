@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use body::BodyModel;
+use evaluation::Recording;
 use evaluation::limbs::{LimbErrors, Limbs, Method, run_all};
-use inverse_kinematics::Recording;
 use model::Silhouette;
 use vision::scene::SilhouetteNoise;
 

@@ -1,5 +1,5 @@
-//! Points on a person that are found again in other pictures of the same camera: Lowe's scale-invariant features (*Distinctive
-//! image features from scale-invariant keypoints*, International Journal of Computer Vision, 2004), inside a silhouette.
+//! Points on a person that are found again in other pictures of the same camera: Lowe's scale-invariant
+//! features (Lowe 2004; docs/papers.md#other-sources), inside a silhouette.
 //!
 //! - [`detect`], [`Detector`]: extrema of differences of Gaussians with their descriptors. Only the region of the person is
 //!   looked at, and only points well inside the silhouette are taken: at its outline the background is seen.

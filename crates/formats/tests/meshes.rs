@@ -1,6 +1,6 @@
 //! OBJ, PLY and NPY: the shared scans, dialects, and damaged files.
 
-use formats::{archive, npy, obj, ply};
+use formats::{archive, mesh_files, npy, obj, ply};
 use model::Mesh;
 use nalgebra::Vector3;
 use proptest::{prelude::*, sample::Index};
@@ -196,6 +196,19 @@ fn arrays_that_claim_more_than_they_have_are_refused() {
 
 /// Reads a file and gives the number of things in it, 0 if it is refused.
 type Reader = fn(&[u8]) -> usize;
+
+#[test]
+fn the_name_of_a_file_tells_the_format_of_its_mesh() {
+    for name in ["scan.obj", "folder/SCAN.OBJ"] {
+        assert_eq!(
+            mesh_files::read(name, obj::write(&mesh()).as_bytes()),
+            obj::read(obj::write(&mesh()).as_bytes())
+        );
+    }
+    assert_eq!(mesh_files::read("scan.ply", &ply::write(&mesh())), ply::read(&ply::write(&mesh())));
+    let error = mesh_files::read("scan.stl", &ply::write(&mesh())).unwrap_err();
+    assert_eq!(error.to_string(), r#"file: found the name "scan.stl", expected an ending .obj or .ply"#);
+}
 
 #[test]
 fn damaged_meshes_and_arrays_are_read_or_refused() {

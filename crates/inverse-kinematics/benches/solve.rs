@@ -5,7 +5,7 @@ mod chains;
 
 use chains::{arm, joints, raised, views};
 use divan::{Bencher, black_box};
-use inverse_kinematics::limb::END;
+use evaluation::limbs::limb::END;
 use inverse_kinematics::{Evidence, Options, Solver};
 
 fn main() {

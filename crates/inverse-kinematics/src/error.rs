@@ -61,10 +61,4 @@ pub enum Error {
     /// Coordinates or points that the skeleton has not.
     #[error(transparent)]
     Kinematics(#[from] kinematics::Error),
-    /// A recorded skeleton without a joint that is needed.
-    #[error("the skeleton has no joint {name}, expected one of the CMU skeleton")]
-    MissingJoint {
-        /// name of the joint
-        name: &'static str,
-    },
 }

@@ -1,7 +1,8 @@
 /// The gain α of steps along ∇h: the paper leaves it "configuration dependent".
 ///
-/// It is the inverse of the curvature met along the last step (Barzilai and Borwein 1988): with s the last step and y the
-/// change of the gradient since, α = −s·s / s·y. Where h curves upwards or nothing is known, it doubles.
+/// It is the inverse of the curvature met along the last step (Barzilai and Borwein 1988;
+/// docs/papers.md#image-constrained-inverse-kinematics): with s the last step and y the change of the gradient since,
+/// α = −s·s / s·y. Where h curves upwards or nothing is known, it doubles.
 #[derive(Debug, Clone)]
 pub(crate) struct Gain {
     first: f64,

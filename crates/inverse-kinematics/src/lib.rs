@@ -6,14 +6,13 @@
 //! silhouettes. h is the mean of an image support along the projected segments; its gradient is that of the image times the
 //! projection's Jacobian times the kinematic Jacobian.
 //!
-//! - [`Chain`]: any `model::Skeleton` with its points, segments and limits: four links in a plane, a limb ([`limb`]), a
-//!   body ([`rig::RigChain`]).
+//! - [`Chain`]: any `model::Skeleton` with its points, segments and limits: four links in a plane, a limb, a body
+//!   ([`rig::RigChain`]).
 //! - [`Task`], [`Options`]: what is wanted, in levels of strict priority (Baerlocher and Boulic 2004), and what the last
 //!   null space is used for.
 //! - [`Support`], [`ImageView`]: silhouettes made ready. Any number of views.
 //! - [`Solver`]: the steps. They take no memory.
 //! - [`Figure`], [`sequence::SequenceSolver`]: a body or a skeleton through frames of measured points and silhouettes, by a [`Method`].
-//! - [`experiment`]: limbs of recorded motion seen by synthetic cameras.
 //!
 //! ```
 //! use inverse_kinematics::{Chain, Evidence, Options, Solver};
@@ -40,11 +39,9 @@ mod figure;
 pub mod flesh;
 mod gain;
 mod image;
-pub mod limb;
 mod method;
 mod options;
 mod priority;
-pub mod recording;
 pub mod rig;
 pub mod sequence;
 mod solver;
@@ -57,7 +54,6 @@ pub use image::{ImageView, Overlap};
 pub use method::Method;
 pub use options::{Criterion, Options, Task};
 pub use priority::Priorities;
-pub use recording::Recording;
 pub use solver::{Evidence, Outcome, Solver};
 pub use support::{Support, SupportWidth};
 

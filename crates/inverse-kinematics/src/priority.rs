@@ -3,7 +3,8 @@ use dense::{add_scaled, inner_product};
 /// Singular values of a task, relative to the greatest, below which a direction still counts as free for the tasks after it.
 const RANK: f64 = 1e-6;
 
-/// Tasks of strict priorities, solved one level after the other (Baerlocher and Boulic 2004):
+/// Tasks of strict priorities, solved one level after the other (Baerlocher and Boulic 2004;
+/// docs/papers.md#image-constrained-inverse-kinematics):
 ///
 /// ```text
 /// J̃ᵢ = Jᵢ Pᵢ₋₁     Δθᵢ = Δθᵢ₋₁ + J̃ᵢ⁺ (Δxᵢ − Jᵢ Δθᵢ₋₁)     Pᵢ = Pᵢ₋₁ − J̃ᵢ⁺ J̃ᵢ     P₀ = I

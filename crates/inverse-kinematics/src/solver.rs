@@ -31,7 +31,8 @@ pub struct Outcome {
 /// Inverse kinematics of one chain. Made once; solving takes no memory.
 ///
 /// A coordinate that a step would take past its limit is put on the limit and taken out, and all levels are solved again
-/// with what is left, as often as another one meets its limit: the others make up for it (Baerlocher and Boulic 2004, §5).
+/// with what is left, as often as another one meets its limit: the others make up for it (Baerlocher and Boulic 2004,
+/// section 5; docs/papers.md#image-constrained-inverse-kinematics).
 #[derive(Debug, Clone)]
 pub struct Solver {
     chain: Chain,

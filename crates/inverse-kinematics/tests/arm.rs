@@ -3,7 +3,7 @@
 mod chains;
 
 use chains::{arm, joints, raised, views};
-use inverse_kinematics::limb::{self, END, INNER, LOWER, UPPER};
+use evaluation::limbs::limb::{self, END, INNER, LOWER, UPPER};
 use inverse_kinematics::{Error, Evidence, Options, Overlap, Solver};
 use kinematics::check_jacobian;
 use nalgebra::Vector3;

@@ -2,7 +2,8 @@ use nalgebra::{Isometry3, Matrix2x3, Vector2, Vector3};
 
 use crate::{Error, Result};
 
-/// A calibrated pinhole camera with radial–tangential lens distortion (Brown 1966, as in OpenCV).
+/// A calibrated pinhole camera with radial–tangential lens distortion (Brown 1966, as in OpenCV;
+/// docs/papers.md#other-sources).
 ///
 /// In camera space x points right, y down and z forward; metres. In the image u points right and v down, pixels, and
 /// (0, 0) is the centre of the top-left pixel.

@@ -35,7 +35,8 @@ impl RandomStream {
         low + (high - low) * self.uniform()
     }
 
-    /// Normal with mean 0 and deviation 1 (Marsaglia's polar method).
+    /// Normal with mean 0 and deviation 1 (Marsaglia's polar method: Marsaglia and Bray 1964;
+    /// docs/papers.md#other-sources).
     pub fn normal(&mut self) -> f64 {
         loop {
             let (u, v) = (2.0 * self.uniform() - 1.0, 2.0 * self.uniform() - 1.0);

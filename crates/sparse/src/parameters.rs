@@ -15,11 +15,14 @@ pub enum Method {
     LocalRegression,
     /// successor of the nearest example: the plain baseline
     Nearest,
-    /// principal components of the neighbours' successors, and smoothness (Chai & Hodgins)
+    /// principal components of the neighbours' successors, and smoothness (Chai & Hodgins 2005;
+    /// docs/papers.md#local-principal-components)
     Lpca,
-    /// least squares on the principal components of the neighbours' windows (Liu et al.)
+    /// least squares on the principal components of the neighbours' windows (Liu et al. 2011, 2014;
+    /// docs/papers.md#principal-component-regression)
     Lpcr,
-    /// a global latent variable model trained beforehand (Grochow et al.); see [`crate::train_gplvm`]
+    /// a global latent variable model trained beforehand (Grochow et al. 2004; docs/papers.md#latent-variable-model); see
+    /// [`crate::train_gplvm`]
     Gplvm,
 }
 

@@ -2,14 +2,13 @@ use std::{fmt, sync::Arc};
 
 use kinematics::ControlPoint;
 use model::{PointTrajectories, Skeleton, SkeletonRecord};
+use motion_db::FRAME_RATE;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{Reader, Writer};
 use crate::{Error, Result};
 
-/// Frames per second of a session inside the program.
-const FRAME_RATE: f64 = motion_db::FRAME_RATE;
 /// Most control points of a session.
 const MAX_POINTS: usize = 16;
 /// What is said to be farther from the origin than this (metres, in any direction) was not measured.

@@ -1,12 +1,9 @@
 //! Sessions in chunks, so that many workers share one: each begins with a key frame of its own.
 
-use std::sync::atomic::AtomicBool;
-
 use body::{BodyModel, Posed, Shape};
-use model::{Camera, Silhouette};
 use nalgebra::Vector3;
 
-use crate::{Error, ObservedFrame, Result, Tracked, Tracker, blended, predict::unwind};
+use crate::{Error, Result, Tracked, blended, predict::unwind};
 
 /// Chunks that put a joint more than this apart where they meet do not agree, metres: one of them lost the person.
 const AGREE_M: f64 = 0.08;
@@ -34,42 +31,6 @@ pub fn plan_chunks(num_frames: usize, length: usize, overlap: usize) -> Vec<Chun
 pub struct Chunk {
     /// in order, without gaps
     pub frames: Vec<Tracked>,
-}
-
-/// Tracks a run of frames that begins with number `first`, by silhouettes alone; the tracker stands at the pose of that frame.
-/// Every frame is told as soon as it is done.
-///
-/// # Errors
-/// [`Error::View`] if a silhouette or calibration can't be used, [`Error::Stopped`] if `stop` became true.
-pub fn track_chunk<F: AsRef<[(Camera, Silhouette)]>>(
-    tracker: &mut Tracker<'_>,
-    first: usize,
-    frames: impl IntoIterator<Item = F>,
-    stop: &AtomicBool,
-    each: impl FnMut(&Tracked),
-) -> Result<Chunk> {
-    let prepare = |(index, views): (usize, F)| ObservedFrame::new(first + index, views.as_ref());
-    track_frames(tracker, frames.into_iter().enumerate().map(prepare), stop, each)
-}
-
-/// The same for frames that are prepared one by one, as they are wanted, such as those with matches of points
-/// ([`ObservedFrame::with_matches`]). What goes wrong with one ends the chunk.
-///
-/// # Errors
-/// That of a frame, or [`Error::Stopped`] if `stop` became true.
-pub fn track_frames<E: From<Error>>(
-    tracker: &mut Tracker<'_>,
-    frames: impl IntoIterator<Item = std::result::Result<ObservedFrame, E>>,
-    stop: &AtomicBool,
-    mut each: impl FnMut(&Tracked),
-) -> std::result::Result<Chunk, E> {
-    let mut chunk = Chunk { frames: Vec::new() };
-    for frame in frames {
-        let tracked = tracker.track(&frame?, stop)?;
-        each(&tracked);
-        chunk.frames.push(tracked);
-    }
-    Ok(chunk)
 }
 
 /// Where two chunks meet.

@@ -3,7 +3,7 @@
 //!
 //! [`Tracker`] takes frame after frame: the pose is predicted, fitted to the contours ([`Tracker::optimise`]), judged limb by
 //! limb ([`Misalignment`]), and searched for by particles where limbs are misaligned ([`Tracker::search`]), then fitted again.
-//! [`track_chunk`] does so for a run of frames that begins with a key frame of its own, [`merge`] puts such runs together.
+//! [`track_footage`] does so for a run of frames in which the person has to be found first, [`merge`] puts such runs together.
 //! The method, its thresholds, and what it was measured to do are in `docs/tracking.md`.
 //!
 //! Metres, radians, y up. Results depend on the seed and on what was seen, not on the number of threads.
@@ -24,11 +24,12 @@ mod predict;
 mod prediction_term;
 mod random;
 mod silhouette_term;
+mod stage;
 mod texture_term;
 mod tracker;
 mod training_poses;
 
-pub use chunk::{Chunk, ChunkPlan, Merged, Seam, merge, plan_chunks, track_chunk, track_frames};
+pub use chunk::{Chunk, ChunkPlan, Merged, Seam, merge, plan_chunks};
 pub use error::Error;
 pub use footage::{Footage, Seen, hold_unseen, track_footage};
 pub use joint_limit_term::joint_limit_energy;
@@ -41,7 +42,8 @@ pub use predict::{blended, predicted};
 pub use prediction_term::PoseSpace;
 pub use random::RandomStream;
 pub use silhouette_term::SilhouetteTerm;
-pub use tracker::{Stage, Tracked, Tracker};
+pub use stage::Stage;
+pub use tracker::{Tracked, Tracker};
 pub use training_poses::built_in_poses;
 
 /// Result of the fallible functions of this crate.

@@ -157,8 +157,8 @@ impl Scene<'_> {
     }
 }
 
-/// Where a ray meets a triangle from its front: distance and barycentric coordinates (Möller and Trumbore, 1997); `None` if it
-/// doesn't, or too slantingly.
+/// Where a ray meets a triangle from its front: distance and barycentric coordinates (Möller and Trumbore 1997;
+/// docs/papers.md#other-sources); `None` if it doesn't, or too slantingly.
 fn crossing(
     origin: &Vector3<f64>,
     direction: &Vector3<f64>,

@@ -25,10 +25,10 @@ impl Default for Options {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Annealing {
     /// interacting simulated annealing: good particles stay where they are, others are drawn anew, and noise has the
-    /// covariance of the particles (Gall, Potthoff, Schnörr, Rosenhahn and Seidel, 2007; Gall et al. 2008)
+    /// covariance of the particles (Gall et al. 2007, 2008; docs/papers.md#particle-search)
     Interacting,
     /// the annealed particle filter: all are drawn anew, weights flatten until half of the particles survive, noise shrinks by a
-    /// fixed factor (Deutscher, Blake and Reid, 2000)
+    /// fixed factor (Deutscher, Blake and Reid 2000; docs/papers.md#particle-search)
     Filter,
 }
 

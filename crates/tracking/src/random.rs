@@ -22,7 +22,7 @@ impl RandomStream {
         (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Of the standard normal distribution (Box and Muller).
+    /// Of the standard normal distribution (Box and Muller 1958; docs/papers.md#other-sources).
     pub fn normal(&mut self) -> f64 {
         // 1 - u is never 0
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();

@@ -8,7 +8,8 @@ use shape_fit::limb_dofs;
 use vision::{Rasteriser, Topology, View};
 
 use crate::{
-    Error, Misalignment, ObservedFrame, Options, Part, Parzen, PoseSpace, Result, Search, built_in_poses,
+    Error, Misalignment, ObservedFrame, Options, Part, Parzen, PoseSpace, Result, Search, Stage,
+    built_in_poses,
     lift::Lifter,
     local::{Local, Problem},
     misalignment::Judge,
@@ -16,19 +17,6 @@ use crate::{
     predict::{unwind, wound},
     predicted,
 };
-
-/// What gave a frame its pose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Stage {
-    /// nobody was seen: the pose is the one before
-    Unseen,
-    /// local optimisation
-    Local,
-    /// particles, and local optimisation after them: nothing is misaligned any more
-    Particles,
-    /// limbs are misaligned, whatever was tried
-    Misaligned,
-}
 
 /// The pose of a frame and how well it fits.
 #[derive(Debug, Clone, PartialEq)]

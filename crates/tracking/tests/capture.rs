@@ -1,18 +1,20 @@
 //! The capture that judges: 40 frames of a stranger, 8 cameras.
 
+mod following;
+
 use std::{
     path::Path,
-    sync::atomic::AtomicBool,
     time::{Duration, Instant},
 };
 
 use body::BodyModel;
 use features::{Features, detect, match_features};
+use following::follow;
 use formats::{calibration, image_files};
 use model::{Camera, PointMatch, Silhouette};
 use nalgebra::Vector3;
 use serde_json::Value;
-use tracking::{Error, ObservedFrame, Options, Stage, Tracker, track_frames};
+use tracking::{Options, Seen, Stage, Tracker};
 use vision::scene::SilhouetteNoise;
 
 const FRAMES: usize = 40;
@@ -98,20 +100,20 @@ fn judge(test: &str, case: &Case) {
         cameras.iter().filter(|_| has_pictures).map(|camera| matches(&folder, camera, &frames)).collect();
     let count: usize = matches.iter().flatten().map(Vec::len).sum();
     println!("{test}: {count} matches");
-    let prepare = |(index, views): (usize, &Vec<_>)| -> Result<_, Error> {
-        let frame = ObservedFrame::new(index, views)?;
-        let with = |frame: ObservedFrame, (camera, matches): (usize, &Vec<Vec<_>>)| {
-            frame.with_matches(camera, &matches[index])
-        };
-        Ok(matches.iter().enumerate().fold(frame, with))
+    let seen = |(index, views): (usize, &Vec<_>)| Seen {
+        views: views.clone(),
+        matches: matches.iter().map(|matches| matches[index].clone()).collect(),
     };
-    let (mut before, mut times) = (Instant::now(), Vec::<(Stage, Duration)>::new());
-    let observed = frames.iter().enumerate().map(prepare);
-    let chunk = track_frames(&mut tracker, observed, &AtomicBool::new(false), |tracked| {
-        times.push((tracked.stage, before.elapsed()));
-        before = Instant::now();
-    });
-    let chunk = chunk.unwrap();
+    let seen: Vec<_> = frames.iter().enumerate().map(seen).collect();
+    // of the beginning of every frame, and of the end
+    let mut marks = Vec::new();
+    let chunk = follow(&mut tracker, &fit.pose, 0, &seen, |_| marks.push(Instant::now()));
+    let times: Vec<(Stage, Duration)> = chunk
+        .frames
+        .iter()
+        .zip(marks.windows(2))
+        .map(|(tracked, at)| (tracked.stage, at[1] - at[0]))
+        .collect();
     let (mut sum, mut worst, mut iou) = (0.0, 0.0f64, 0.0);
     for (tracked, truth) in chunk.frames.iter().zip(&truth) {
         let errors: Vec<f64> =

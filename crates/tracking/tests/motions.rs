@@ -1,5 +1,6 @@
 //! People whose motion is known are followed.
 
+mod following;
 mod moving;
 #[path = "../../body/tests/scans/mod.rs"]
 mod scans;
@@ -7,15 +8,22 @@ mod scans;
 use std::sync::atomic::AtomicBool;
 
 use body::BodyModel;
+use following::follow;
 use model::{Camera, Silhouette};
 use moving::{cameras, distances, mixed, pose, seen};
+use nalgebra::Vector3;
 use tracking::{
     Chunk, Error, Footage, ObservedFrame, Options, Seen, Stage, Tracker, hold_unseen, merge, plan_chunks,
-    track_chunk, track_footage,
+    track_footage,
 };
 use vision::scene::SilhouetteNoise;
 
 static GO: AtomicBool = AtomicBool::new(false);
+
+/// What was seen of frames without pictures.
+fn silhouettes(frames: &[(moving::Views, Vec<Vector3<f64>>)]) -> Vec<Seen> {
+    frames.iter().map(|(views, _)| Seen { views: views.clone(), matches: Vec::new() }).collect()
+}
 
 /// Follows a registered scan, whose surface is not one of the model's, through a mixed motion, from a start that `shape_fit`
 /// finds. Limits: mean joint error, largest, metres; least intersection over union.
@@ -25,7 +33,7 @@ fn judge(test: &str, subjects: &[usize], views: usize, noise: Option<u64>, limit
     let model = BodyModel::shipped();
     let cameras = cameras(views);
     for &subject in subjects {
-        let shape = model.shape_of(data.scans[subject].clone()).unwrap();
+        let shape = scans::shape_of(&model, &data.scans[subject]);
         let motion = mixed(&model, 6);
         let mut frames: Vec<_> = motion.iter().map(|pose| seen(&model, &shape, pose, &cameras)).collect();
         for (frame, (views, _)) in frames.iter_mut().enumerate() {
@@ -37,8 +45,7 @@ fn judge(test: &str, subjects: &[usize], views: usize, noise: Option<u64>, limit
         }
         let fit = shape_fit::fit(&model, &frames[0].0, &shape_fit::Options::default()).unwrap();
         let mut tracker = Tracker::new(&model, &fit.alpha, &fit.pose, Options::default()).unwrap();
-        let views = frames.iter().map(|(views, _)| views);
-        let chunk = track_chunk(&mut tracker, 0, views, &GO, |_| ()).unwrap();
+        let chunk = follow(&mut tracker, &fit.pose, 0, &silhouettes(&frames), |_| ());
         let (mut sum, mut worst, mut iou) = (0.0, 0.0f64, 1.0f64);
         for (tracked, (_, truth)) in chunk.frames.iter().zip(&frames) {
             let mean = distances(&tracked.joints, truth).sum::<f64>() / truth.len() as f64;
@@ -83,9 +90,9 @@ fn chunks_tracked_apart_are_one_motion() {
     let chunks: Vec<Chunk> = plan_chunks(frames.len(), 8, 3)
         .iter()
         .map(|plan| {
-            let views = frames[plan.first..plan.end].iter().map(|(views, _)| views);
-            let mut tracker = Tracker::new(&model, &alpha, &motion[plan.first], Options::default()).unwrap();
-            track_chunk(&mut tracker, plan.first, views, &GO, |_| ()).unwrap()
+            let start = &motion[plan.first];
+            let mut tracker = Tracker::new(&model, &alpha, start, Options::default()).unwrap();
+            follow(&mut tracker, start, plan.first, &silhouettes(&frames[plan.first..plan.end]), |_| ())
         })
         .collect();
     let merged = merge(&model, &shape, &chunks).unwrap();
@@ -109,12 +116,11 @@ fn a_person_who_turns_round_once_has_no_jump_in_any_number() {
     let chunks: Vec<Chunk> = plans
         .iter()
         .map(|plan| {
-            let views = frames[plan.first..plan.end].iter().map(|(views, _)| views);
             // a key frame knows of no turns before it
             let mut start = motion[plan.first].clone();
             start[4] -= if plan.first == 0 { 0.0 } else { std::f64::consts::TAU };
             let mut tracker = Tracker::new(&model, &[], &start, Options::default()).unwrap();
-            track_chunk(&mut tracker, plan.first, views, &GO, |_| ()).unwrap()
+            follow(&mut tracker, &start, plan.first, &silhouettes(&frames[plan.first..plan.end]), |_| ())
         })
         .collect();
     let merged = merge(&model, &model.shape(&[]), &chunks).unwrap();

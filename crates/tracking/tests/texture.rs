@@ -1,24 +1,22 @@
 //! What pictures of a textured body tell beyond its silhouettes.
 
+mod following;
 mod moving;
 #[path = "../../body/tests/scans/mod.rs"]
 mod scans;
 mod textured;
 
-use std::sync::atomic::AtomicBool;
-
 use body::{BodyModel, Posed, Shape};
 use features::FrameMatcher;
+use following::follow;
 use model::{Camera, PointMatch};
 use moving::{Views, cameras, distances, mixed, pose, seen};
 use nalgebra::{Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tracking::{Chunk, Error, ObservedFrame, Options, Stage, Tracker, track_frames};
+use tracking::{Chunk, Options, Seen, Stage, Tracker};
 use vision::Topology;
-
-static GO: AtomicBool = AtomicBool::new(false);
 
 /// Everything that is seen of a motion.
 struct Film {
@@ -52,24 +50,26 @@ fn film(model: &BodyModel, shape: &Shape, motion: &[Vec<f64>], cameras: &[Camera
 impl Film {
     /// Follows it with a share of the matches spoiled; without pictures for `None`.
     fn follow(&self, model: &BodyModel, alpha: &[f64], start: &[f64], spoiled: Option<f64>) -> Chunk {
-        let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut tracker = Tracker::new(model, alpha, start, Options::default()).unwrap();
-        let frames = self.views.iter().enumerate().map(|(index, views)| -> Result<_, Error> {
-            let mut frame = ObservedFrame::new(index, views)?;
-            let Some(share) = spoiled else { return Ok(frame) };
-            for (camera, matches) in self.matches.iter().enumerate() {
-                let mut matches = matches[index].clone();
-                for found in &mut matches {
-                    if random.random::<f64>() < share {
-                        let mut far = || 120.0 * random.random::<f64>() - 60.0;
-                        found.now += Vector2::new(far(), far());
-                    }
+        follow(&mut tracker, start, 0, &self.seen(spoiled), |_| ())
+    }
+
+    fn seen(&self, spoiled: Option<f64>) -> Vec<Seen> {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut spoil = |mut matches: Vec<PointMatch>, share: f64| {
+            for found in &mut matches {
+                if random.random::<f64>() < share {
+                    let mut far = || 120.0 * random.random::<f64>() - 60.0;
+                    found.now += Vector2::new(far(), far());
                 }
-                frame = frame.with_matches(camera, &matches);
             }
-            Ok(frame)
-        });
-        track_frames(&mut tracker, frames, &GO, |_| ()).unwrap()
+            matches
+        };
+        let frame = |(index, views): (usize, &Views)| {
+            let of_camera = |matches: &Vec<Vec<PointMatch>>| Some(spoil(matches[index].clone(), spoiled?));
+            Seen { views: views.clone(), matches: self.matches.iter().filter_map(of_camera).collect() }
+        };
+        self.views.iter().enumerate().map(frame).collect()
     }
 
     /// Mean and largest joint error, metres.
@@ -150,7 +150,7 @@ fn texture_follows_a_scanned_person_no_worse_than_silhouettes() {
     let data = scans::Scans::read(&bodies);
     let model = BodyModel::shipped();
     let subject = 60;
-    let shape = model.shape_of(data.scans[subject].clone()).unwrap();
+    let shape = scans::shape_of(&model, &data.scans[subject]);
     let motion = mixed(&model, 5);
     let film = film(&model, &shape, &motion, &cameras(4));
     let fit = shape_fit::fit(&model, &film.views[0], &shape_fit::Options::default()).unwrap();

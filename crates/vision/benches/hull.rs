@@ -1,11 +1,11 @@
-//! How long it takes to carve the hull of 8 views of 1004 × 1004 pixels, distance fields included, by the side of its cells;
-//! and to compare two bodies of 6,500 vertices. Without the shared data nothing is measured.
+//! How long it takes to carve the hull of 8 views of 1004 × 1004 pixels, distance fields included, by the side of its cells.
+//! Without the shared data nothing is measured.
 
 #[path = "../tests/capture/mod.rs"]
 mod capture;
 
 use divan::Bencher;
-use vision::{HullOptions, HullView, carve_hull, compare_surfaces};
+use vision::{HullOptions, HullView, carve_hull};
 
 fn main() {
     divan::main();
@@ -21,12 +21,4 @@ fn hull(bencher: Bencher, cell_m: f64) {
         .map(|(camera, silhouette)| HullView { camera, silhouette })
         .collect();
     bencher.bench_local(|| carve_hull(&views, &HullOptions { cell_m, ..HullOptions::default() }));
-}
-
-#[divan::bench(sample_count = 10)]
-fn surface_distance(bencher: Bencher) {
-    let Some(capture) = capture::frame_0("surface distance") else { return };
-    let mut moved = capture.mesh.clone();
-    moved.vertices.iter_mut().for_each(|vertex| vertex.x += 0.01);
-    bencher.bench_local(|| compare_surfaces(&moved, &capture.mesh, 10_000, 0));
 }

@@ -5,10 +5,10 @@ use crate::reduced_pixel;
 
 /// Signed distance to the outline of a silhouette at every pixel, and the nearest pixel of the other kind.
 ///
-/// Exact Euclidean transform (Meijster et al., *A general algorithm for computing distance transforms in linear time*, 2000;
-/// the second pass is the lower envelope of Felzenszwalb and Huttenlocher, *Distance transforms of sampled functions*,
-/// 2012). The outline lies halfway between pixels of both kinds, so a pixel of the person is as far inside as the nearest
-/// background pixel is away, less half a pixel, and a background pixel likewise outside.
+/// Exact Euclidean transform (Meijster et al. 2000; the second pass is the lower envelope of Felzenszwalb and
+/// Huttenlocher 2012; docs/papers.md#other-sources). The outline lies halfway between pixels of both kinds, so a pixel of
+/// the person is as far inside as the nearest background pixel is away, less half a pixel, and a background pixel likewise
+/// outside.
 ///
 /// Positions and distances are in pixels of the silhouette it was made from, whatever its `scale`.
 #[derive(Debug, Clone, PartialEq)]

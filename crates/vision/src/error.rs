@@ -4,14 +4,6 @@ use model::shown;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is no surface to measure to.
-    #[error("the mesh has {faces} faces and an area of {area_m2} m², expected a surface")]
-    NoSurface {
-        /// faces of the mesh
-        faces: usize,
-        /// their area
-        area_m2: f64,
-    },
     /// A hull needs views from at least two sides.
     #[error("found {found} views, expected at least 2")]
     TooFewViews {

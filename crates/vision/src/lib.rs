@@ -5,7 +5,6 @@
 //! - [`find_rim`]: the points of a mesh that make its outline.
 //! - [`Chamfer`], [`overlap_in`]: how much two silhouettes differ.
 //! - [`carve_hull`]: the visual hull of several views, and which view disagrees with the others.
-//! - [`Surface`], [`compare_surfaces`], [`sample_surface`]: distances between surfaces.
 //! - [`scene`]: synthetic captures and their noise.
 //!
 //! Metres and y up in the world; pixels in images, (0, 0) is the centre of the top-left one (`docs/vision.md`).
@@ -39,7 +38,6 @@ mod hull;
 mod raster;
 mod rim;
 pub mod scene;
-mod surface;
 mod topology;
 mod view;
 
@@ -51,8 +49,5 @@ pub use error::Error;
 pub use hull::{Agreement, Hull, HullOptions, HullView, carve_hull};
 pub use raster::Rasteriser;
 pub use rim::{RimPoint, find_rim};
-pub use surface::{
-    Closest, DistanceStatistics, Surface, SurfaceComparison, compare_surfaces, sample_surface,
-};
 pub use topology::{Edge, Topology};
 pub use view::{View, reduced_pixel};

@@ -3,9 +3,10 @@
 mod capture;
 
 use capture::frame_0;
+use evaluation::surface::{Surface, sample_surface};
 use model::{Mesh, Silhouette};
 use nalgebra::Vector3;
-use vision::{Error, Hull, HullOptions, HullView, Surface, Topology, carve_hull, sample_surface, scene};
+use vision::{Error, Hull, HullOptions, HullView, Topology, carve_hull, scene};
 
 fn carve(capture: &capture::Capture, cameras: &[usize], options: &HullOptions) -> Result<Hull, Error> {
     let view = |&index: &usize| HullView {

@@ -234,11 +234,11 @@ fn entries(paths: &[PathBuf]) -> anyhow::Result<Vec<Entry>> {
     let mut entries = Vec::new();
     for (path, name) in files {
         let name = name.to_string_lossy().into_owned();
-        if !body::is_scan_file(&name) && !pack::is_archive(&name) {
+        if !body::is_part_of_scan_set(&name) && !pack::is_archive(&name) {
             continue;
         }
         let bytes = fs::read(&path).with_context(|| path.display().to_string())?;
-        let found = archive::entries_where(&name, &bytes, &Limits::default(), body::is_scan_file);
+        let found = archive::entries_where(&name, &bytes, &Limits::default(), body::is_part_of_scan_set);
         entries.extend(found.with_context(|| path.display().to_string())?);
     }
     Ok(entries)
@@ -266,7 +266,7 @@ fn learn_here(args: &LearnArgs, out: &Path) -> anyhow::Result<()> {
 
 fn learn_there(args: &LearnArgs) -> anyhow::Result<()> {
     let client = Client::new(args.server.server()?);
-    let uploads = pack::pack_where(&args.name, &args.files, &|name| body::is_scan_file(name))?;
+    let uploads = pack::pack_where(&args.name, &args.files, &|name| body::is_part_of_scan_set(name))?;
     let made = Request::default().with("name", "NAME", Some(args.name.as_str()));
     let model: Value = client.post_request("/v1/body-models", &made)?;
     let id = model["id"].as_str().context("the answer has no id")?;

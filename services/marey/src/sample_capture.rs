@@ -7,9 +7,9 @@ use std::{
 
 use anyhow::Context;
 use body::{BodyModel, Posed, Wanted};
+use evaluation::Recording;
 use formats::{calibration, image_files, ply};
 use indicatif::ProgressBar;
-use inverse_kinematics::Recording;
 use model::{Camera, Mesh, counted};
 use sample_motion::{Action, DrawOptions, FRAME_RATE, Model};
 use serde_json::{Value, json};

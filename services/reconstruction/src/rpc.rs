@@ -15,7 +15,6 @@ use uuid::Uuid;
 const MAX_FRAMES: usize = 600;
 /// Longest request; the answer to it has 1,200 frames and stays below gRPC's usual limit of 4 MB a message.
 const MAX_SECONDS: f64 = 20.0;
-const DEFAULT_FRAME_RATE: f64 = 60.0;
 /// Rates outside would make very many frames of few, or none, Hz.
 const FRAME_RATES: std::ops::RangeInclusive<f64> = 10.0..=10_000.0;
 
@@ -36,7 +35,7 @@ impl Rpc {
             let (what, expected) = ("frames", "1 to 600");
             return Err(proto::Error::Count { what, found: frames, expected }.into());
         }
-        let rate = if request.frame_rate_hz == 0.0 { DEFAULT_FRAME_RATE } else { request.frame_rate_hz };
+        let rate = if request.frame_rate_hz == 0.0 { motion_db::FRAME_RATE } else { request.frame_rate_hz };
         if !FRAME_RATES.contains(&rate) {
             return Err(out_of_range("frame_rate_hz", rate, "10 to 10000").into());
         }

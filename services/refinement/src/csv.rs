@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use jobs::file_part;
 use tracking::Stage;
 
-use crate::{finished::Finished, stage_name::stage_name};
+use crate::finished::Finished;
 
 /// `quality.csv`: a row a frame. `frame` counts as the cameras do, `time` is in seconds from the first row, overlaps are
 /// intersections over union, and cells are empty where there is nothing to say.
@@ -20,7 +20,7 @@ pub(crate) fn quality(finished: &Finished) -> String {
         let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
         let is_seen = tracked.stage != Stage::Unseen;
         let time = row as f64 / finished.frame_rate;
-        let _ = write!(out, "{},{time:.6},{}", tracked.frame, stage_name(tracked.stage));
+        let _ = write!(out, "{},{time:.6},{}", tracked.frame, tracked.stage.name());
         let _ = write!(out, ",{}", number(is_seen.then(|| tracked.mean_iou())));
         for overlap in &tracked.ious {
             let _ = write!(out, ",{}", number(*overlap));

@@ -19,7 +19,6 @@ mod options;
 mod refine;
 mod report;
 mod rpc;
-mod stage_name;
 mod track_job;
 
 pub use error::InputError;

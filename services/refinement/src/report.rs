@@ -11,10 +11,7 @@ use results::{ResultFile, media_type::JSON};
 use serde_json::{Value, json};
 use tracking::{Stage, Tracked};
 
-use crate::{
-    finished::{Finished, Meeting},
-    stage_name::stage_name,
-};
+use crate::finished::{Finished, Meeting};
 
 /// Share of frames with a misaligned limb from which on a user had better look.
 const MANY: f64 = 0.05;
@@ -31,7 +28,7 @@ fn found(finished: &Finished) -> Value {
     let count = |stage: Stage| frames.iter().filter(|tracked| tracked.stage == stage).count();
     let stages = [Stage::Local, Stage::Particles, Stage::Misaligned, Stage::Unseen];
     let stages: serde_json::Map<String, Value> =
-        stages.map(|stage| (stage_name(stage).to_owned(), count(stage).into())).into_iter().collect();
+        stages.map(|stage| (stage.name().to_owned(), count(stage).into())).into_iter().collect();
     let cameras = finished.cameras.iter().zip(overlaps(finished));
     let cameras: serde_json::Map<String, Value> =
         cameras.map(|(camera, overlap)| (camera.clone(), json!(overlap))).collect();

@@ -126,8 +126,8 @@ impl BuildHandler {
             let (name, total_bytes) = (file.name.clone(), left);
             let unpacked = compute::run(move || -> Result<Vec<Entry>, InputError> {
                 let limits = Limits { total_bytes, ..Limits::default() };
-                let is_single = body::is_scan_file(&name);
-                let mut entries = archive::entries_where(&name, &bytes, &limits, body::is_scan_file)
+                let is_single = body::is_part_of_scan_set(&name);
+                let mut entries = archive::entries_where(&name, &bytes, &limits, body::is_part_of_scan_set)
                     .map_err(FileError::in_file(&name))?;
                 if !is_single {
                     entries.iter_mut().for_each(|entry| entry.name.insert_str(0, &format!("{name}/")));

@@ -78,7 +78,7 @@ fn a_body_is_found_in_the_masks_of_eight_cameras() -> Result<()> {
     assert!(off < 0.015, "stature is off by {off} m");
     let found = formats::ply::read(&result(&api, &run, "mesh.ply")?)?.value;
     let truth = formats::ply::read(&fs::read(data.join("groundtruth/mesh_0000.ply"))?)?.value;
-    let distances = vision::compare_surfaces(&found, &truth, 20_000, 1)?.both;
+    let distances = evaluation::surface::compare_surfaces(&found, &truth, 20_000, 1)?.both;
     println!("surface: mean {:.1} mm, std {:.1} mm", 1e3 * distances.mean_abs_m, 1e3 * distances.std_m);
     assert!(distances.mean_abs_m <= 0.008 && distances.std_m <= 0.010, "{distances:?}");
     let joints = joint_error(&shape, &data)?;

@@ -1,7 +1,7 @@
 //! What a file is used for, by its name.
 
-/// Whether a file of that name is looked at; what systems hide in archives isn't.
-pub fn is_scan_file(name: &str) -> bool {
+/// Whether a [`ScanSet`](super::ScanSet) uses a file of that name; archives, and what systems hide in them, it does not.
+pub fn is_part_of_scan_set(name: &str) -> bool {
     FileUse::from_name(name) != FileUse::None
 }
 

@@ -20,9 +20,7 @@ pub(crate) struct RawScan {
 
 /// Reads a mesh from OBJ or PLY; what was doubtful goes to `warnings`.
 pub(crate) fn mesh(entry: &Entry, warnings: &mut Vec<String>) -> Result<model::Mesh> {
-    let is_obj = entry.name.to_ascii_lowercase().ends_with(".obj");
-    let read = if is_obj { formats::obj::read(&entry.bytes) } else { formats::ply::read(&entry.bytes) };
-    let read = read.map_err(Error::in_file(&entry.name))?;
+    let read = formats::mesh_files::read(&entry.name, &entry.bytes).map_err(Error::in_file(&entry.name))?;
     warnings.extend(read.warnings.into_iter().map(|w| format!("{}: {}", entry.name, w.message)));
     Ok(read.value)
 }

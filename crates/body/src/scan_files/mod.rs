@@ -10,5 +10,5 @@ mod rig;
 mod set;
 mod tables;
 
-pub use file_use::is_scan_file;
+pub use file_use::is_part_of_scan_set;
 pub use set::{ScanOptions, ScanSet};

@@ -3,7 +3,7 @@
 
 use std::{fs, path::Path};
 
-use body::{BodyModel, ModelParts, RigFile, Scan, Sex, Skin, Subject, Template, TemplateParts};
+use body::{BodyModel, ModelParts, RigFile, Scan, Sex, Shape, Skin, Subject, Template, TemplateParts};
 use nalgebra::Vector3;
 
 /// Numbers of an NPY file.
@@ -14,6 +14,16 @@ pub fn numbers(path: &Path) -> Vec<f64> {
 
 fn points(numbers: &[f64], scale: f64) -> Vec<Vector3<f64>> {
     numbers.as_chunks::<3>().0.iter().map(|&p| Vector3::from(p) * scale).collect()
+}
+
+/// A body that isn't one of the model's, in the rest pose: a scan itself. Its joints are the regressor's.
+pub fn shape_of(model: &BodyModel, vertices: &[Vector3<f64>]) -> Shape {
+    assert_eq!(vertices.len(), model.num_vertices());
+    Shape {
+        alpha: vec![0.0; model.num_components()],
+        vertices: vertices.to_vec(),
+        joints: model.regressor().joints(vertices),
+    }
 }
 
 /// Scans, what is known of the people, and the template of `bodies` in the shared data.

@@ -8,8 +8,8 @@ use std::{
 
 use anyhow::{Context, bail};
 use evaluation::Body;
-use formats::{FileRole, calibration, image_files};
-use model::{Camera, Image, Mesh, Silhouette, counted};
+use formats::{FileRole, calibration, image_files, mesh_files};
+use model::{Camera, Image, Silhouette, counted};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
@@ -118,14 +118,9 @@ impl Folder {
         let Some(file) = meshes.get(&frame) else {
             bail!("found no mesh of frame {frame} in {}, expected mesh_{frame:04}.ply", folder.display());
         };
-        let content = bytes(file)?;
-        let mesh = if has_ending(file, &["ply"]) {
-            formats::ply::read(&content)
-        } else {
-            formats::obj::read(&content)
-        };
-        let mesh: Mesh = mesh.with_context(|| format!("cannot read {}", file.display()))?.value;
-        Ok(Body { mesh, joints: self.joints(frame)? })
+        let read = mesh_files::read(&file.to_string_lossy(), &bytes(file)?)
+            .with_context(|| format!("cannot read {}", file.display()))?;
+        Ok(Body { mesh: read.value, joints: self.joints(frame)? })
     }
 }
 

@@ -102,7 +102,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let found = fit(&model, &seen(&folder, first, args.noise)?, &shape_fit::Options::default());
     let found: Fit = found.with_context(|| format!("frame {first} of {}", args.folder.display()))?;
     let mut run = Run::new(&model, &found, &training, args)?;
-    run.times.start_s = started.elapsed().as_secs_f64();
+    run.times.fit_shape_s = started.elapsed().as_secs_f64();
     let mut texture = (!args.no_texture).then(|| Texture::new(folder.cameras.len()));
     let mut film =
         args.overlay.as_deref().map(|to| Film::create(to, &model, &found, &folder, args.rate)).transpose()?;
@@ -218,7 +218,7 @@ impl<'a> Run<'a> {
         }
         let report = FrameReport {
             frame: 0,
-            stage: report::stage(tracked.stage),
+            stage: tracked.stage,
             errors: joints.compare(&tracked.joints, truth),
             iou: tracked.mean_iou(),
             misaligned: tracked.misalignment.misaligned().map(|limb| format!("{limb:?}")).collect(),

@@ -8,20 +8,21 @@
 use std::sync::Arc;
 
 use body::{BodyModel, Posed, Shape};
-use inverse_kinematics::{
-    ImageView, Options, Recording, Result, Support, SupportWidth, limb,
-    recording::{LIMBS, rig_joints},
-};
+use inverse_kinematics::{ImageView, Options, Support, SupportWidth};
 use model::{Camera, Silhouette};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use vision::{DistanceField, Rasteriser, Topology, View, scene::Ring};
 
-mod still;
-mod tracked;
+use crate::recording::{LIMBS, rig_joints};
+use crate::{Recording, Result};
 
+mod followed;
+pub mod limb;
+mod still;
+
+use followed::FollowedLimb;
 pub use still::Still;
-use tracked::Tracked;
 
 /// Two arms or two legs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -189,11 +190,11 @@ pub fn run(
     let topology = Topology::new(model.faces(), model.num_vertices());
     let mut rasteriser = Rasteriser::new();
     let mut posed = Posed::default();
-    let mut tracked = Vec::new();
+    let mut followed = Vec::new();
     let mut errors = Vec::new();
     for method in methods {
         for index in limbs.indices() {
-            tracked.push(Tracked::new(model, shape, limbs, index, method)?);
+            followed.push(FollowedLimb::new(model, shape, limbs, index, method)?);
         }
         errors.push(LimbErrors { method: method.name.clone(), inner_mm: Vec::new(), residual_mm: 0.0 });
     }
@@ -206,7 +207,7 @@ pub fn run(
         });
         let fields: Vec<_> = fields.collect();
         let heading = heading(model, limbs, &posed)?;
-        for (index, limb) in tracked.iter_mut().enumerate() {
+        for (index, limb) in followed.iter_mut().enumerate() {
             let [base, inner, end] = limb.bones.map(|joint| posed.joints[joint]);
             let seen: Vec<_> = limb
                 .views

@@ -1,15 +1,14 @@
 use std::sync::Arc;
 
 use body::{BodyModel, Posed, Shape};
-use inverse_kinematics::{
-    Evidence, ImageView, Outcome, Result, Solver, Support, limb,
-    recording::{LIMBS, rig_joints},
-};
+use inverse_kinematics::{Evidence, ImageView, Outcome, Solver, Support};
 use model::Silhouette;
 use nalgebra::Vector3;
 use vision::{DistanceField, Rasteriser, Topology, View};
 
-use super::{Limbs, Method, Tracked, cameras, heading};
+use super::{FollowedLimb, Limbs, Method, cameras, heading, limb};
+use crate::Result;
+use crate::recording::{LIMBS, rig_joints};
 
 /// One limb in one frame, to be solved again and again from the same start: what is timed.
 #[derive(Debug, Clone)]
@@ -52,9 +51,9 @@ impl Still {
             ImageView { camera, support }
         });
         let views: Vec<_> = views.collect();
-        let mut limb = Tracked::new(model, shape, limbs, index, method)?;
+        let mut limb = FollowedLimb::new(model, shape, limbs, index, method)?;
         limb.solve(&base, &end, heading(model, limbs, &posed)?, &views)?;
-        let Tracked { limb, solver, x: mut start, posture, .. } = limb;
+        let FollowedLimb { limb, solver, x: mut start, posture, .. } = limb;
         limb.swivel(&mut start, &(end - base), 0.4);
         let mut targets = vec![None; solver.chain().points().len()];
         targets[limb::END] = Some(end + Vector3::repeat(0.03));
@@ -68,6 +67,6 @@ impl Still {
     pub fn solve(&mut self) -> Result<Outcome> {
         self.x.copy_from_slice(&self.start);
         let evidence = Evidence { targets: &self.targets, views: &self.views, posture: &self.posture };
-        self.solver.solve(&mut self.x, &evidence)
+        Ok(self.solver.solve(&mut self.x, &evidence)?)
     }
 }

@@ -9,8 +9,8 @@ const FAR: f64 = 0.95;
 const CANDIDATES: usize = 200;
 
 /// Indices of `count` poses, increasing, that stand for all: k-medoids over the angles (the root doesn't count), from centres that
-/// are far from each other. As in the k-centre method (Gonzalez 1985) every centre is far from all before it; but the farthest
-/// 5 % are passed over, or each odd pose would stand for itself. Nothing is drawn at random.
+/// are far from each other. As in the k-centre method (Gonzalez 1985; docs/papers.md#other-sources) every centre is far from all
+/// before it; but the farthest 5 % are passed over, or each odd pose would stand for itself. Nothing is drawn at random.
 pub fn covering<P: AsRef<[f64]> + Sync>(poses: &[P], count: usize) -> Vec<usize> {
     if poses.len() <= count || count == 0 {
         return (0..poses.len().min(count)).collect();

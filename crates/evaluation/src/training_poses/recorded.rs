@@ -1,13 +1,10 @@
 use body::{BodyModel, ROOT_DOFS};
-use inverse_kinematics::Recording;
 use model::Motion;
 use motion_db::MotionDatabase;
 use rayon::prelude::*;
 
 use super::covering::{covering, squared};
-use crate::Error;
-
-type Result<T> = std::result::Result<T, Error>;
+use crate::{Error, Recording, Result};
 
 /// Poses of recordings are taken so far apart, seconds: a fifth of a second later people are in another pose.
 const EVERY_S: f64 = 0.2;
@@ -26,7 +23,7 @@ pub fn recorded_poses(model: &BodyModel, recordings: &[(&str, &Motion)]) -> Resu
     let poses = |&(name, motion): &(&str, &Motion)| {
         let step = (EVERY_S * motion.frame_rate()).round().max(1.0) as usize;
         let recording = Recording::new(model, &shape, motion, step);
-        recording.map_err(|source| Error::Recording { name: name.to_owned(), source })
+        recording.map_err(|source| Error::Recording { name: name.to_owned(), source: Box::new(source) })
     };
     let found: Vec<Result<Recording>> = recordings.par_iter().map(poses).collect();
     let mut all = Vec::new();

@@ -2,7 +2,7 @@
 
 use std::{f64::consts::PI, sync::Arc};
 
-use inverse_kinematics::limb::{self, Build, Limb};
+use evaluation::limbs::limb::{self, Build, Limb};
 use inverse_kinematics::{ImageView, Support, SupportWidth};
 use model::Silhouette;
 use nalgebra::{Vector2, Vector3};

@@ -21,7 +21,8 @@ struct Curvature {
     sy: f64,
 }
 
-/// Minimiser of smooth functions: L-BFGS (Nocedal & Wright 2006, algorithm 7.5) with a backtracking line search.
+/// Minimiser of smooth functions: L-BFGS (Nocedal & Wright 2006, algorithm 7.5; docs/papers.md#latent-variable-model) with a
+/// backtracking line search.
 pub struct Lbfgs {
     past: VecDeque<Curvature>,
     gradient: Vec<f64>,

@@ -1,6 +1,6 @@
-//! Surface where a field passes zero: marching cubes (Lorensen and Cline 1987). The triangles of each of the 256 cases are
-//! derived from rules for the faces of a cell rather than from a table, so that cells that share a face always agree and the
-//! surface is closed.
+//! Surface where a field passes zero: marching cubes (Lorensen and Cline 1987; docs/papers.md#other-sources).
+//! The triangles of each of the 256 cases are derived from rules for the faces of a cell rather than from a table, so that
+//! cells that share a face always agree and the surface is closed.
 
 use std::sync::LazyLock;
 

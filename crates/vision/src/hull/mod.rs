@@ -1,5 +1,5 @@
-//! The visual hull: all of space that every camera sees as the person (Laurentini, *The visual hull concept for
-//! silhouette-based image understanding*, 1994), carved by an octree and returned as a closed surface.
+//! The visual hull: all of space that every camera sees as the person (Laurentini 1994;
+//! docs/papers.md#other-sources), carved by an octree and returned as a closed surface.
 
 mod agreement;
 mod bounds;

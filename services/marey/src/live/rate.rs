@@ -1,7 +1,7 @@
 //! Which of the lines that come in are frames.
 
-/// Frames a second that a server takes.
-pub const FRAME_RATE: f64 = 60.0;
+use motion_db::FRAME_RATE;
+
 /// Clocks of people's programs are not exact: a rate that is off by less than this part is meant as the whole one.
 const TOLERANCE: f64 = 0.1;
 

@@ -8,10 +8,7 @@ use model::{PointTrajectories, Samples, shown, shown_rate};
 use nalgebra::Vector3;
 use tokio::sync::mpsc;
 
-use super::{
-    pace::Pace,
-    rate::{FRAME_RATE, Rate},
-};
+use super::{pace::Pace, rate::Rate};
 
 /// Lines that are read before they can be sent.
 const LINES_AHEAD: usize = 4;
@@ -84,7 +81,7 @@ impl Source {
         let bytes = std::fs::read(path).with_context(name)?;
         let trajectories =
             session::read_points(&name(), &bytes, &Options::default()).with_context(name)?.value;
-        let ratio = trajectories.frame_rate() / FRAME_RATE;
+        let ratio = trajectories.frame_rate() / motion_db::FRAME_RATE;
         let step = ratio.round();
         ensure!(
             step >= 1.0 && (ratio - step).abs() < 0.01 * step,

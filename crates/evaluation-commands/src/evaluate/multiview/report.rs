@@ -4,7 +4,7 @@ use evaluation::{
     Distribution,
     tables::{Cell, Table},
 };
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use tracking::Stage;
 
 use super::joints::{JointErrors, Joints};
@@ -16,7 +16,8 @@ const LOST_MM: f64 = 100.0;
 #[derive(Serialize)]
 pub struct FrameReport {
     pub frame: u32,
-    pub stage: &'static str,
+    #[serde(serialize_with = "by_name")]
+    pub stage: Stage,
     #[serde(flatten)]
     pub errors: JointErrors,
     pub iou: f64,
@@ -30,20 +31,15 @@ pub struct FrameReport {
     pub kept: JointErrors,
 }
 
-pub fn stage(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Unseen => "unseen",
-        Stage::Local => "local",
-        Stage::Particles => "particles",
-        Stage::Misaligned => "misaligned",
-    }
+fn by_name<S: Serializer>(stage: &Stage, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(stage.name())
 }
 
 /// Times that belong to no frame.
 #[derive(Default)]
 pub struct Times {
     /// finding pose and shape in the first frame, seconds
-    pub start_s: f64,
+    pub fit_shape_s: f64,
     /// searches over all DOFs whose result wasn't used, milliseconds
     pub search_ms: Vec<f64>,
     /// finding points in the pictures of a frame and matching them, milliseconds
@@ -103,7 +99,7 @@ pub struct Report {
     features_ms: Option<Distribution>,
     /// points that cameras found again, in all frames
     matches: usize,
-    initialisation_s: f64,
+    fit_shape_s: f64,
     local_only: Baseline,
     first_pose_kept: Baseline,
     #[serde(flatten)]
@@ -132,8 +128,8 @@ fn baseline(
 impl Report {
     pub fn new(joints: Joints, frames: Vec<FrameReport>, times: &Times, settings: Settings) -> Self {
         let all = |frame: &FrameReport| frame.prepare_ms + frame.track_ms;
-        let at_stage = |stage: &'static str| frames.iter().filter(move |frame| frame.stage == stage);
-        let local_ms = Distribution::from_figures(at_stage("local").map(all));
+        let at_stage = |stage: Stage| frames.iter().filter(move |frame| frame.stage == stage);
+        let local_ms = Distribution::from_figures(at_stage(Stage::Local).map(all));
         let searched: Vec<f64> = frames
             .iter()
             .filter(|frame| frame.effective_sample_size.is_some())
@@ -144,7 +140,7 @@ impl Report {
         Self {
             joint_mean_mm: own.joint_mean_mm,
             joint_max_mm: own.joint_max_mm,
-            misaligned_frames: at_stage("misaligned").count(),
+            misaligned_frames: at_stage(Stage::Misaligned).count(),
             iou_mean: own.iou_mean.unwrap_or_default(),
             local_ms_per_frame: local_ms.map(|local| local.mean),
             global_ms_per_frame: mean(times.search_ms.iter().copied()),
@@ -153,17 +149,17 @@ impl Report {
             frames_lost: own.frames_lost,
             joints_left_out: joints.left_out,
             stages: Stages {
-                local: at_stage("local").count(),
-                particles: at_stage("particles").count(),
-                misaligned: at_stage("misaligned").count(),
-                unseen: at_stage("unseen").count(),
+                local: at_stage(Stage::Local).count(),
+                particles: at_stage(Stage::Particles).count(),
+                misaligned: at_stage(Stage::Misaligned).count(),
+                unseen: at_stage(Stage::Unseen).count(),
             },
             local_ms,
             prepare_ms: Distribution::from_figures(frames.iter().map(|frame| frame.prepare_ms)),
             search_ms: Distribution::from_figures(times.search_ms.iter().copied()),
             features_ms: Distribution::from_figures(times.features_ms.iter().copied()),
             matches: times.matches,
-            initialisation_s: times.start_s,
+            fit_shape_s: times.fit_shape_s,
             local_only: baseline(&frames, |frame| &frame.local_only, alone),
             first_pose_kept: baseline(&frames, |frame| &frame.kept, None),
             settings,
@@ -241,7 +237,7 @@ impl Report {
 mod tests {
     use super::*;
 
-    fn frame(stage: &'static str, track_ms: f64, searched: bool) -> FrameReport {
+    fn frame(stage: Stage, track_ms: f64, searched: bool) -> FrameReport {
         FrameReport {
             frame: 0,
             stage,
@@ -273,15 +269,15 @@ mod tests {
                 prior_is_recorded: false,
                 alpha: Vec::new(),
             };
-            let times = Times { start_s: 1.0, search_ms: vec![300.0], ..Times::default() };
+            let times = Times { fit_shape_s: 1.0, search_ms: vec![300.0], ..Times::default() };
             Report::new(joints, frames, &times, settings)
         };
-        let local = || vec![frame("local", 50.0, false), frame("local", 70.0, false)];
+        let local = || vec![frame(Stage::Local, 50.0, false), frame(Stage::Local, 70.0, false)];
         let without = report(local());
         assert_eq!((without.local_ms_per_frame, without.global_ms_per_frame), (Some(70.0), Some(300.0)));
         assert_eq!(without.repair_ms_per_frame, None);
         let mut frames = local();
-        frames.push(frame("particles", 460.0, true));
+        frames.push(frame(Stage::Particles, 460.0, true));
         let with = report(frames);
         assert_eq!((with.global_ms_per_frame, with.repair_ms_per_frame), (Some(300.0), Some(400.0)));
         assert_eq!((with.frames_lost, with.stages.particles, with.misaligned_frames), (1, 1, 0));
@@ -294,8 +290,10 @@ mod tests {
             "local_ms_per_frame",
             "global_ms_per_frame",
             "frames",
+            "fit_shape_s",
         ] {
             assert!(json[key].is_number(), "{key}");
         }
+        assert_eq!(json["per_frame"][2]["stage"], "particles");
     }
 }

@@ -247,7 +247,7 @@ fn entries(folder: &Path) -> anyhow::Result<Vec<Entry>> {
     let mut entries = Vec::new();
     for file in files {
         let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if file.is_file() && body::is_scan_file(&name) {
+        if file.is_file() && body::is_part_of_scan_set(&name) {
             entries.push(Entry { name, bytes: bytes(&file)? });
         }
     }

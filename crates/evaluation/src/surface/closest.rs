@@ -1,7 +1,8 @@
 use model::Mesh;
 use nalgebra::Vector3;
+use vision::Topology;
 
-use crate::{Error, Topology};
+use crate::{Error, Result};
 
 /// A triangle mesh in which the point nearest to another point is found fast: a tree of boxes around its triangles.
 #[derive(Debug, Clone)]
@@ -21,7 +22,7 @@ pub struct Closest {
     /// weights of the face's corners, not negative, sum 1
     pub weights: [f64; 3],
     /// distance from the surface, metres: positive outside (the side that faces look at), negative inside. The sign is
-    /// that of Baerentzen and Aanaes, *Signed distance computation using the angle weighted pseudonormal*, 2005
+    /// that of angle-weighted normals (Bærentzen and Aanæs 2005; docs/papers.md#other-sources)
     pub signed_m: f64,
 }
 
@@ -55,7 +56,7 @@ impl Surface {
     ///
     /// # Errors
     /// [`Error::NoSurface`] if no face has an area.
-    pub fn new(mesh: &Mesh) -> Result<Self, Error> {
+    pub fn new(mesh: &Mesh) -> Result<Self> {
         let normal = |face: &[u32; 3]| {
             let [a, b, c] = mesh.corners(face);
             (b - a).cross(&(c - a)).try_normalize(1e-18)
@@ -200,7 +201,7 @@ fn build(triangles: &mut [Triangle], first: u32, nodes: &mut Vec<Node>) {
 }
 
 /// Weights of the corners of a triangle for its point nearest to `point`; exactly 0 for corners that have no part in it.
-/// After Ericson, *Real-Time Collision Detection*, 2005, section 5.1.5.
+/// After Ericson 2005 (docs/papers.md#other-sources), section 5.1.5.
 fn nearest_weights(point: &Vector3<f64>, [a, b, c]: &[Vector3<f64>; 3]) -> [f64; 3] {
     let (ab, ac) = (b - a, c - a);
     let from_a = point - a;

@@ -1,11 +1,9 @@
 //! An arm or a leg as the paper has them: two joints of three rotations each, hung from a place that is given.
 
+use inverse_kinematics::{Chain, Result, flesh::Flesh};
 use kinematics::{ControlPoint, HEADING, Parametrisation, ROOT_DOFS, References, rotation_exp, rotation_log};
 use model::{Axis, Channel, Joint, Skeleton};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
-
-use crate::flesh::Flesh;
-use crate::{Chain, Result};
 
 /// Index of the chain's point at the shoulder or hip.
 pub const BASE: usize = 0;

@@ -1,16 +1,14 @@
 use body::{BodyModel, Shape};
-use inverse_kinematics::{
-    Error, Evidence, ImageView, Result, Solver, SupportWidth,
-    flesh::along,
-    limb::{self, Build, Limb},
-    recording::{LIMBS, rig_joints},
-};
+use inverse_kinematics::{Evidence, ImageView, Solver, SupportWidth, flesh::along};
 use nalgebra::Vector3;
 
+use super::limb::{self, Build, Limb};
 use super::{Limbs, Method};
+use crate::recording::{LIMBS, rig_joints};
+use crate::{Error, Result};
 
 /// One limb being followed by one method.
-pub(super) struct Tracked {
+pub(super) struct FollowedLimb {
     pub limb: Limb,
     pub solver: Solver,
     /// the last solution
@@ -28,7 +26,7 @@ pub(super) struct Tracked {
     is_started: bool,
 }
 
-impl Tracked {
+impl FollowedLimb {
     pub fn new(
         model: &BodyModel,
         shape: &Shape,

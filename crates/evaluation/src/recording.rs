@@ -1,15 +1,16 @@
 //! Recorded motion of the CMU skeleton on the morphable body.
 
 use body::{BodyModel, Shape};
+use inverse_kinematics::{Evidence, Options, Solver, rig::RigChain};
 use kinematics::{Kinematics, Parametrisation, control_points};
 use model::Motion;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::{Error, Evidence, Options, Result, Solver, rig::RigChain};
+use crate::{Error, Result};
 
 /// Joints of the CMU skeleton that correspond to the rig's; the last of each limb stands at the end of the one before.
 /// Arms, then legs; the left one first.
-pub const LIMBS: [([&str; 3], [&str; 3]); 4] = [
+pub(crate) const LIMBS: [([&str; 3], [&str; 3]); 4] = [
     (["lhumerus", "lradius", "lhand"], ["l_shoulder", "l_elbow", "l_wrist"]),
     (["rhumerus", "rradius", "rhand"], ["r_shoulder", "r_elbow", "r_wrist"]),
     (["lfemur", "ltibia", "lfoot"], ["l_hip", "l_knee", "l_ankle"]),
@@ -20,7 +21,7 @@ pub const LIMBS: [([&str; 3], [&str; 3]); 4] = [
 ///
 /// # Errors
 /// [`Error::MissingJoint`] with the first that the rig has not.
-pub fn rig_joints(model: &BodyModel, names: [&'static str; 3]) -> Result<[usize; 3]> {
+pub(crate) fn rig_joints(model: &BodyModel, names: [&'static str; 3]) -> Result<[usize; 3]> {
     let mut found = [0; 3];
     for (found, name) in found.iter_mut().zip(names) {
         *found = model.rig().joint_index(name).ok_or(Error::MissingJoint { name })?;
@@ -47,7 +48,7 @@ impl Recording {
         if let Some(&name) = names.iter().find(|&&name| skeleton.joint_index(name).is_none()) {
             return Err(Error::MissingJoint { name });
         }
-        let points = control_points(skeleton, &names)?;
+        let points = control_points(skeleton, &names).map_err(inverse_kinematics::Error::from)?;
         let recorded = Kinematics::new(skeleton, Parametrisation::channels(skeleton));
         let mut state = recorded.state();
         let frames: Vec<Vec<Vector3<f64>>> = motion

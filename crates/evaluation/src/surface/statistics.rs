@@ -3,7 +3,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{Surface, sample_surface};
-use crate::Error;
+use crate::Result;
 
 /// Mean, spread and extreme of signed distances.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,13 +52,8 @@ pub struct SurfaceComparison {
 /// The meshes need not have the same topology.
 ///
 /// # Errors
-/// [`Error::NoSurface`] if one has no area.
-pub fn compare_surfaces(
-    found: &Mesh,
-    truth: &Mesh,
-    samples: usize,
-    seed: u64,
-) -> Result<SurfaceComparison, Error> {
+/// [`crate::Error::NoSurface`] if one has no area.
+pub fn compare_surfaces(found: &Mesh, truth: &Mesh, samples: usize, seed: u64) -> Result<SurfaceComparison> {
     let (found_surface, true_surface) = (Surface::new(found)?, Surface::new(truth)?);
     let mut forth = true_surface.signed_distances(&sample_surface(found, samples, seed)?);
     let mut back = found_surface.signed_distances(&sample_surface(truth, samples, seed)?);

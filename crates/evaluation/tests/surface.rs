@@ -1,11 +1,10 @@
 //! Distances to a body's surface, against all its triangles.
 
-mod capture;
+mod captured;
 
-use capture::frame_0;
+use evaluation::surface::{Surface, compare_surfaces, sample_surface};
 use model::Mesh;
 use nalgebra::Vector3;
-use vision::{Surface, compare_surfaces, sample_surface};
 
 /// Distance from a triangle: the least over its plane, sides and corners, whichever the point projects to.
 fn distance_from_triangle(point: Vector3<f64>, [a, b, c]: [Vector3<f64>; 3]) -> f64 {
@@ -23,7 +22,7 @@ fn distance_from_triangle(point: Vector3<f64>, [a, b, c]: [Vector3<f64>; 3]) -> 
 }
 
 /// Number of faces' solid angle around a point, in full turns: 1 inside a closed mesh, 0 outside (van Oosterom and
-/// Strackee 1983).
+/// Strackee 1983; docs/papers.md#other-sources).
 fn winding(point: Vector3<f64>, mesh: &Mesh) -> f64 {
     let solid_angle = |face: &[u32; 3]| {
         let [a, b, c] = mesh.corners(face).map(|corner| corner - point);
@@ -36,8 +35,7 @@ fn winding(point: Vector3<f64>, mesh: &Mesh) -> f64 {
 
 #[test]
 fn the_nearest_point_of_a_body_is_that_of_all_its_triangles() {
-    let Some(capture) = frame_0("nearest points") else { return };
-    let mesh = capture.mesh;
+    let Some(mesh) = captured::mesh("nearest points") else { return };
     let surface = Surface::new(&mesh).unwrap();
     let mut state = 99u64;
     let mut uniform = || {
@@ -59,8 +57,7 @@ fn the_nearest_point_of_a_body_is_that_of_all_its_triangles() {
 
 #[test]
 fn a_body_grown_along_its_normals_is_outside_by_as_much() {
-    let Some(capture) = frame_0("grown body") else { return };
-    let mesh = capture.mesh;
+    let Some(mesh) = captured::mesh("grown body") else { return };
     let mut grown = mesh.clone();
     for (vertex, normal) in grown.vertices.iter_mut().zip(mesh.normals()) {
         *vertex += normal * 0.004;
@@ -77,8 +74,7 @@ fn a_body_grown_along_its_normals_is_outside_by_as_much() {
 
 #[test]
 fn samples_are_spread_by_area_and_repeat() {
-    let Some(capture) = frame_0("samples") else { return };
-    let mesh = capture.mesh;
+    let Some(mesh) = captured::mesh("samples") else { return };
     let points = sample_surface(&mesh, 50_000, 3).unwrap();
     assert_eq!(points, sample_surface(&mesh, 50_000, 3).unwrap());
     assert_ne!(points, sample_surface(&mesh, 50_000, 4).unwrap());

@@ -3,13 +3,13 @@ use nalgebra::Vector3;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use crate::Error;
+use crate::{Error, Result};
 
 /// Points of a mesh's surface, metres, drawn uniformly by area. The same mesh, count and seed give the same points.
 ///
 /// # Errors
 /// [`Error::NoSurface`] if the mesh has no area.
-pub fn sample_surface(mesh: &Mesh, count: usize, seed: u64) -> Result<Vec<Vector3<f64>>, Error> {
+pub fn sample_surface(mesh: &Mesh, count: usize, seed: u64) -> Result<Vec<Vector3<f64>>> {
     let mut area_m2 = 0.0;
     let up_to: Vec<f64> = mesh
         .faces
