@@ -1,13 +1,13 @@
 //! The job that puts the parts of a motion database together and writes its index files.
 
 use crate::{
-    contents::{Clip, Contents, shares, shortened},
+    contents::{shares, shortened},
     plan_job::no_database,
     shards,
     sources::Sources,
 };
 use jobs::{
-    motion_database::{BuildMotionDatabase, PlanMotionDatabase},
+    motion_database::{BuildMotionDatabase, Clip, Contents, PlanMotionDatabase},
     run_json::{Origin, RUN_JSON, RunReport, Timings},
 };
 use library::{

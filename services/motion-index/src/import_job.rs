@@ -74,7 +74,7 @@ fn import(
     let basis = MotionDatabase::from_bytes(basis).map_err(JobError::retry)?;
     let motions = inputs::unpack_packed(motions)?;
     let mut reader = Reader::new(inputs::unpack_packed(skeletons)?, payload.bvh_metres_per_unit);
-    let augment = Augment { mirror: payload.augment.mirror, speeds: payload.augment.warps.clone() };
+    let augment = Augment { mirror: payload.augment.mirror, speeds: payload.augment.speeds.clone() };
     let mut part = basis.emptied();
     let (mut clips, mut warnings) = (Vec::new(), Vec::new());
     let num_files = motions.len();

@@ -1,13 +1,13 @@
 //! Where the clips of a database come from: the index files of the version before, and the parts that were imported.
 
 use crate::{
-    contents::{Clip, Names, names},
+    contents::{Names, names},
     import_job::{PART, REPORT},
     plan_job::full_name,
 };
 use jobs::{
     JobReport,
-    motion_database::{PartReport, PlanMotionDatabase},
+    motion_database::{Clip, PartReport, PlanMotionDatabase},
 };
 use library::{motion_database, motion_database::Shard};
 use motion_db::{MotionDatabase, trial_name};
