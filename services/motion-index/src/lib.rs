@@ -12,7 +12,6 @@
 //! they are first asked for and kept in memory up to a bound; the shards of large ones are kept by several replicas.
 
 mod build_job;
-mod catalogue;
 pub mod config;
 mod contents;
 mod databases;

@@ -5,14 +5,13 @@ use jobs::{
     motion_database::TrainGplvm,
     run_json::{RUN_JSON, RunReport, Timings},
 };
-use library::motion_database;
+use library::{motion_database, versions::motion_databases};
 use queue::{Handler, JobContext, JobError, Outcome};
 use results::{ResultFile, media_type::JSON};
 use serde_json::json;
 use service::{Resources, compute, objects};
-use sqlx::{PgConnection, types::Json};
 use std::ops::ControlFlow;
-use store::{Stored, key};
+use store::key;
 
 /// Name of the model in the object store.
 const MODEL: &str = "gplvm.model";
@@ -61,37 +60,7 @@ impl Handler for TrainHandler {
         let report = results::write_one(store, &context, report).await?;
         Ok(Outcome::default().artefact(report).on_complete(move |connection| {
             let (request, stored) = (request.clone(), stored.clone());
-            Box::pin(async move { record(connection, run, &request, &stored).await })
+            Box::pin(async move { motion_databases::set_gplvm(connection, run, &request, &stored).await })
         }))
     }
-}
-
-async fn record(
-    connection: &mut PgConnection,
-    run: uuid::Uuid,
-    request: &TrainGplvm,
-    stored: &Stored,
-) -> Result<(), JobError> {
-    // Of a database that was deleted meanwhile there is nothing to record.
-    let sql = "INSERT INTO motion_database_models
-                   (motion_database_id, method, train_run_id, parameters, store_key, bytes, blake3)
-               SELECT id, 'gplvm', $2, $3, $4, $5, $6 FROM motion_databases WHERE id = $1
-               ON CONFLICT (motion_database_id, method) DO UPDATE
-               SET train_run_id = excluded.train_run_id, parameters = excluded.parameters,
-                   store_key = excluded.store_key, bytes = excluded.bytes, blake3 = excluded.blake3,
-                   trained_at = clock_timestamp()";
-    let recorded = sqlx::query(sql)
-        .bind(request.motion_database.id)
-        .bind(run)
-        .bind(Json(&request.parameters))
-        .bind(stored.key.as_str())
-        .bind(i64::try_from(stored.bytes).unwrap_or(i64::MAX))
-        .bind(&stored.blake3)
-        .execute(connection)
-        .await?
-        .rows_affected();
-    if recorded == 1 {
-        return Ok(());
-    }
-    Err(JobError::give_up("the motion database was deleted meanwhile", request.motion_database.id))
 }
