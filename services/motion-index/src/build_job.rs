@@ -8,7 +8,7 @@ use crate::{
 };
 use jobs::{
     motion_database::{BuildMotionDatabase, Clip, Contents, PlanMotionDatabase},
-    run_json::{Origin, RUN_JSON, RunReport, Timings},
+    run_json::{Origin, RunReport, Timings},
 };
 use library::{
     AllCores,
@@ -17,11 +17,11 @@ use library::{
 };
 use model::counted;
 use motion_db::MotionDatabase;
-use queue::{Handler, JobContext, JobError, Outcome};
-use results::{ResultFile, media_type::JSON};
+use queue::{Handler, JobContext, JobError, JobId, Outcome};
+use results::ResultFile;
 use serde::Serialize;
 use serde_json::json;
-use service::{Resources, compute, objects};
+use service::{MakesVersion, Resources, compute};
 use std::io::{BufWriter, Seek};
 use store::{Key, Stored, UploadLimits, key};
 use tokio_util::io::ReaderStream;
@@ -37,14 +37,18 @@ pub(crate) struct BuildHandler {
     pub resources: Resources,
 }
 
+impl MakesVersion for BuildHandler {
+    fn version_prefix(job: &BuildMotionDatabase, id: JobId) -> Key {
+        key::motion_database_job_prefix(job.request.motion_database.id, id.0)
+    }
+}
+
 impl Handler for BuildHandler {
     type Job = BuildMotionDatabase;
 
     async fn run(&self, context: JobContext, job: BuildMotionDatabase) -> Result<Outcome, JobError> {
         let BuildMotionDatabase { request, plan } = job;
         let (store, id) = (&self.resources.store, request.motion_database.id);
-        let own = key::motion_database_job_prefix(id, context.id().0);
-        objects::clean_up_earlier_attempts_under(store, &context, &own).await;
         context.progress(0.0, "listing clips");
         let sources = Sources::find(&context, &self.resources, &request).await?;
         let written = self.write(&context, &request, &sources).await?;
@@ -95,7 +99,7 @@ fn run_json(
         "bytes": built.bytes,
         "blake3": built.stored.blake3,
     });
-    Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(request, json!({ "built": built }))?))
+    results::run_json(&report, request, json!({ "built": built }))
 }
 
 /// The index files of a database, or the one.

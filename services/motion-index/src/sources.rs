@@ -61,8 +61,7 @@ impl Sources {
             context.check()?;
             let named = |name: &str| left.iter().map(|a| &a.artefact).find(|a| a.name == name);
             let Some(report) = named(REPORT) else { continue };
-            let report = resources.read_artefact(report, u64::MAX).await?;
-            let report: PartReport = serde_json::from_slice(&report).map_err(JobError::retry)?;
+            let report: PartReport = resources.read_json(report, u64::MAX).await?;
             sources.add_part(report, named(PART));
         }
         Ok(sources)

@@ -7,16 +7,16 @@ use formats::archive::{self, Entry, Limits};
 use jobs::{
     InputFile,
     body_model::BuildBodyModel,
-    run_json::{RUN_JSON, RunReport, Timings},
+    run_json::{RunReport, Timings},
 };
 use library::versions::{Built, body_models::BuiltBodyModel};
 use model::counted;
-use queue::{Handler, JobContext, JobError, Outcome};
-use results::{ResultFile, media_type::JSON};
+use queue::{Handler, JobContext, JobError, JobId, Outcome};
+use results::ResultFile;
 use serde::Serialize;
 use serde_json::{Value, json};
-use service::{FileError, compute, objects};
-use store::key;
+use service::{FileError, MakesVersion, compute};
+use store::{Key, key};
 
 use crate::{InputError, Shared};
 
@@ -45,13 +45,17 @@ struct Contents {
     warnings: Vec<String>,
 }
 
+impl MakesVersion for BuildHandler {
+    fn version_prefix(job: &BuildBodyModel, id: JobId) -> Key {
+        key::body_model_job_prefix(job.body_model.id, id.0)
+    }
+}
+
 impl Handler for BuildHandler {
     type Job = BuildBodyModel;
 
     async fn run(&self, context: JobContext, request: BuildBodyModel) -> Result<Outcome, JobError> {
         let (store, id) = (&self.shared.resources.store, request.body_model.id);
-        let own = key::body_model_job_prefix(id, context.id().0);
-        objects::clean_up_earlier_attempts_under(store, &context, &own).await;
         let entries = self.unpack(&context, &request.files).await?;
         context.progress(0.3, "reading the scans");
         let options = ScanOptions { metres_per_unit: request.metres_per_unit };
@@ -95,8 +99,8 @@ impl Handler for BuildHandler {
             "bytes": stored.bytes,
             "blake3": stored.blake3,
         });
-        let run = run.to_json(&request, json!({ "built": own }))?;
-        let files = vec![ResultFile::json(SUMMARY, &contents)?, ResultFile::ready(RUN_JSON, JSON, run)];
+        let run = results::run_json(&run, &request, json!({ "built": own }))?;
+        let files = vec![ResultFile::json(SUMMARY, &contents)?, run];
         let written = results::write(store, &context, files, 0.97..1.0).await?;
         let model = BuiltBodyModel {
             built: Built { id, bytes: stored.bytes, stored, contents },
