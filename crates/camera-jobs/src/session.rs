@@ -11,10 +11,9 @@ const MAX_BYTES: u64 = 64 << 20;
 /// What is known of a session whose person is followed.
 ///
 /// # Errors
-/// As [`objects::read`].
+/// As [`objects::read_json`].
 pub async fn tracking_session(resources: &Resources, object: &Object) -> Result<TrackingSession, JobError> {
     let Object { store_key, blake3 } = object;
     let input = Input { name: "the session's artefact", store_key, blake3 };
-    let bytes = objects::read(&resources.store, input, MAX_BYTES).await?;
-    serde_json::from_slice(&bytes).map_err(JobError::retry)
+    objects::read_json(&resources.store, input, MAX_BYTES).await
 }

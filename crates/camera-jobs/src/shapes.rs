@@ -1,9 +1,6 @@
-use body::{BodyModel, Sex, Shape, Wanted};
+use body::{BodyModel, MAX_DEVIATIONS, Sex, Shape, Wanted};
 use jobs::inverse_kinematics::BodyDescription;
 use model::counted;
-
-/// Largest coefficient, standard deviations.
-const MOST: f64 = 6.0;
 
 /// Why a description is of no body.
 #[derive(Debug, thiserror::Error)]
@@ -51,7 +48,7 @@ pub fn shape(model: &BodyModel, described: &BodyDescription) -> Result<Shape, Sh
         let found = counted(alpha.len(), "number");
         return refuse("alpha", found, "at most as many as the model has components");
     }
-    if let Some(found) = alpha.iter().find(|a| a.is_nan() || a.abs() > MOST) {
+    if let Some(found) = alpha.iter().find(|a| a.is_nan() || a.abs() > MAX_DEVIATIONS) {
         return refuse("alpha", found.to_string(), "-6 to 6 standard deviations");
     }
     Ok(model.shape(alpha))

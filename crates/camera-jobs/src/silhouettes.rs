@@ -21,14 +21,13 @@ pub type View = (Camera, Silhouette);
 /// What was found of every camera, in their order.
 ///
 /// # Errors
-/// As [`objects::read`].
+/// As [`objects::read_json`].
 pub async fn reports(resources: &Resources, artefacts: &[Artefact]) -> Result<Vec<CameraReport>, JobError> {
     let mut reports = Vec::new();
     for index in 0.. {
         let name = report_name(index);
         let Some(artefact) = artefacts.iter().find(|artefact| artefact.name == name) else { break };
-        let bytes = resources.read_artefact(artefact, MAX_BYTES).await?;
-        reports.push(serde_json::from_slice(&bytes).map_err(JobError::retry)?);
+        reports.push(resources.read_json(artefact, MAX_BYTES).await?);
     }
     Ok(reports)
 }

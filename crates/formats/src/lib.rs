@@ -26,6 +26,7 @@ mod file_role;
 mod frame_rate;
 pub mod glb;
 pub mod image_files;
+pub mod media_type;
 pub mod mesh_files;
 pub mod motion_csv;
 pub mod motion_files;

@@ -1,9 +1,11 @@
 //! Runs that build motion databases or train models on them.
 
 mod augment;
+mod contents;
 
 pub use crate::versions::{MotionDatabaseFile, VersionName};
 pub use augment::{Augment, Error};
+pub use contents::{Clip, Contents, Share};
 use queue::Job;
 use regression::gplvm::TrainingOptions;
 use serde::{Deserialize, Serialize};

@@ -15,10 +15,10 @@ pub use silhouettes::{
 pub use tracking::{DrawOverlay, FitShape, MergeTracks, TRACKED, TrackChunk, TrackingSession};
 
 use crate::{
-    CameraChoice, SessionInputs,
+    CameraChoice, JobReport, SessionInputs,
     body_model::BodyModelFile,
     inverse_kinematics::{self, InverseKinematics},
-    run_json::{LearnedFrom, Request, Subject},
+    run_json::{LearnedFrom, Request, Subject, Timings},
 };
 
 /// The kind of such runs.
@@ -75,4 +75,10 @@ impl Request for PlanMultiView {
         // only the search by particles draws any
         if self.parameters.track { vec![self.parameters.seed] } else { Vec::new() }
     }
+}
+
+/// The first stages of a run that has cameras: its plan, and the silhouettes of each camera. Runs without cameras have no plan.
+pub fn timings<'a>(plan: Option<&'a JobReport>, cameras: &'a [CameraReport]) -> Timings<'a> {
+    let timings = plan.into_iter().fold(Timings::default(), |timings, plan| timings.one("plan", plan));
+    timings.all("cameras", cameras.iter().map(|camera| &camera.job))
 }

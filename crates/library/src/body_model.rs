@@ -9,7 +9,7 @@ use queue::JobError;
 use service::{Resources, compute, objects};
 use uuid::Uuid;
 
-use crate::Cache;
+use crate::{Cache, versions::body_models};
 
 /// What models take together in memory, bytes; one takes about six times its file.
 const CACHE_BYTES: u64 = 256 << 20;
@@ -72,13 +72,8 @@ impl Models {
             return Ok(shipped_file());
         }
         let id: Uuid = proto::id("body_model_id", which)?;
-        let sql = "SELECT id, name, version, store_key, blake3 FROM body_models
-                   WHERE id = $1 AND store_key IS NOT NULL";
-        let row: Option<(Uuid, String, i32, String, String)> =
-            sqlx::query_as(sql).bind(id).fetch_optional(&self.resources.pool).await?;
-        let (id, name, version, store_key, blake3) =
-            row.ok_or_else(|| ModelError::NoSuchModel(which.to_owned()))?;
-        Ok(BodyModelFile { id, name, version, store_key: Some(store_key), blake3 })
+        let found = body_models::find(&self.resources.pool, id).await?;
+        found.ok_or_else(|| ModelError::NoSuchModel(which.to_owned()))
     }
 }
 

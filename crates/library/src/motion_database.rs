@@ -1,15 +1,12 @@
 //! Motion databases in the object store: one index file, or a list of several that are the shards of one database.
 
 use bytes::Bytes;
-use jobs::motion_database::MotionDatabaseFile;
 use motion_db::{IndexFile, MotionDatabase, WindowIndex};
 use queue::JobError;
 use serde::{Deserialize, Serialize};
 use service::compute;
-use sqlx::PgPool;
 use std::{str::FromStr, sync::Arc};
 use store::{Key, Store};
-use uuid::Uuid;
 
 /// Name of an index file that is a whole database.
 pub const INDEX: &str = "index.mdb";
@@ -18,25 +15,6 @@ pub const SHARDS: &str = "shards.json";
 
 /// First bytes of a list of shards, which tell it from an index file.
 const LIST: u8 = b'{';
-
-/// The database of that id, if it is ready, without the models that were trained on it.
-///
-/// # Errors
-/// If PostgreSQL fails.
-pub async fn find(pool: &PgPool, id: Uuid) -> sqlx::Result<Option<MotionDatabaseFile>> {
-    let sql = "SELECT id, name, version, store_key, blake3 FROM motion_databases
-               WHERE id = $1 AND store_key IS NOT NULL";
-    let row: Option<(Uuid, String, i32, String, String)> =
-        sqlx::query_as(sql).bind(id).fetch_optional(pool).await?;
-    Ok(row.map(|(id, name, version, store_key, blake3)| MotionDatabaseFile {
-        id,
-        name,
-        version,
-        store_key,
-        blake3,
-        gplvm: None,
-    }))
-}
 
 /// The list of the shards of a database. Whole clips lie in one shard each, in the order in which they have it here.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

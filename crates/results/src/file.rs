@@ -1,9 +1,8 @@
 use std::{fmt, path::PathBuf};
 
+use formats::media_type;
 use queue::JobError;
 use serde::Serialize;
-
-use crate::media_type;
 
 /// A file that people get: its name, its media type, and how it comes by its content.
 pub struct ResultFile {

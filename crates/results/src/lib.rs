@@ -5,12 +5,13 @@
 //! [`write`] writes them one after the other.
 
 mod file;
-pub mod media_type;
 mod positions;
+mod run_json;
 mod table;
 mod write;
 
 pub use file::ResultFile;
 pub use positions::cell;
+pub use run_json::run_json;
 pub use table::{Body, Finished, Kind, formats};
 pub use write::{write, write_one};

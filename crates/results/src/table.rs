@@ -3,15 +3,15 @@
 use std::{borrow::Cow, sync::Arc};
 
 use body::{BodyModel, Poses, Shape};
-use formats::{amc, asf, bvh, c3d, motion_csv, points_csv, trc};
+use formats::{
+    amc, asf, bvh, c3d,
+    media_type::{BINARY, CSV, GLB, TEXT},
+    motion_csv, points_csv, trc,
+};
 use model::{Motion, PointTrajectories};
 use queue::JobError;
 
-use crate::{
-    ResultFile,
-    media_type::{BINARY, CSV, GLB, TEXT},
-    positions::positions_csv,
-};
+use crate::{ResultFile, positions::positions_csv};
 
 /// A kind of runs, as far as its files have names of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

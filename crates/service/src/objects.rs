@@ -1,7 +1,9 @@
 //! Objects as jobs see them: uploads read, artefacts written, the store's errors told apart.
 
 use bytes::Bytes;
+use formats::media_type;
 use queue::{Artefact, JobContext, JobError};
+use serde::{Serialize, de::DeserializeOwned};
 use std::str::FromStr;
 use store::{Error, Key, Store, Stored, key};
 
@@ -14,6 +16,12 @@ pub struct Input<'a> {
     pub store_key: &'a str,
     /// BLAKE3 of its content, hex.
     pub blake3: &'a str,
+}
+
+impl<'a> From<&'a Artefact> for Input<'a> {
+    fn from(artefact: &'a Artefact) -> Self {
+        Self { name: &artefact.name, store_key: &artefact.store_key, blake3: &artefact.blake3 }
+    }
 }
 
 /// Reads an object whole and checks it.
@@ -33,6 +41,18 @@ pub async fn read(store: &Store, input: Input<'_>, max_bytes: u64) -> Result<Byt
         ),
         _ => JobError::retry(error),
     })
+}
+
+/// Reads an object that an earlier job wrote with [`write_json`].
+///
+/// # Errors
+/// As [`read`]; to be tried again if it is not what was expected.
+pub async fn read_json<T: DeserializeOwned>(
+    store: &Store,
+    input: Input<'_>,
+    max_bytes: u64,
+) -> Result<T, JobError> {
+    serde_json::from_slice(&read(store, input, max_bytes).await?).map_err(JobError::retry)
 }
 
 /// Where an artefact of the job goes: under its own lease.
@@ -58,6 +78,20 @@ pub async fn write(
     Ok(artefact(name, media_type, stored))
 }
 
+/// Writes what a later job reads as JSON, an artefact of this job under its own lease.
+///
+/// # Errors
+/// To be tried again if it is no JSON, or the store failed.
+pub async fn write_json(
+    store: &Store,
+    job: &JobContext,
+    name: &str,
+    value: &impl Serialize,
+) -> Result<Artefact, JobError> {
+    let content = serde_json::to_vec(value).map_err(JobError::retry)?;
+    write(store, job, name, media_type::JSON, content).await
+}
+
 /// What a stored object is as an artefact.
 pub fn artefact(name: &str, media_type: &str, stored: Stored) -> Artefact {
     Artefact {
@@ -70,13 +104,9 @@ pub fn artefact(name: &str, media_type: &str, stored: Stored) -> Artefact {
     }
 }
 
-/// Removes what earlier attempts at the job left. Failing to is no reason to fail the job.
-pub(crate) async fn clean_up_earlier_attempts(store: &Store, job: &JobContext) {
-    clean_up_earlier_attempts_under(store, job, &key::job_prefix(job.run_id().0, job.id().0)).await;
-}
-
-/// Removes what earlier attempts at the job left under `prefix`, a job's of [`store::key`].
-pub async fn clean_up_earlier_attempts_under(store: &Store, job: &JobContext, prefix: &Key) {
+/// Removes what earlier attempts at the job left under `prefix`, a job's of [`store::key`]. Failing to is no reason to fail the
+/// job.
+pub(crate) async fn clean_up_earlier_attempts(store: &Store, job: &JobContext, prefix: &Key) {
     if job.lease_number().0 <= 1 {
         return;
     }

@@ -4,14 +4,16 @@ use jobs::{
     InputFile, JobReport,
     run_json::{Code, Origin},
 };
-use queue::{Artefact, JobContext, JobError};
+use queue::{Artefact, Handler, JobContext, JobError};
+use serde::de::DeserializeOwned;
 use sqlx::PgPool;
-use store::Store;
+use store::{Store, key};
 
 use crate::{
     Config, Error,
     config::{MemoryConfig, WorkerConfig},
     database,
+    making_versions::{CleanStart, MakesVersion},
     objects::{self, Input},
 };
 
@@ -45,12 +47,15 @@ impl Resources {
     }
 
     /// A worker loop that is set up as configured; `None` if it is to claim nothing. Before every attempt at a job it removes
-    /// what earlier ones left.
+    /// what earlier ones left of artefacts and results; what they left of a version, [`Self::making_versions`] does.
     pub fn worker(&self, config: &WorkerConfig) -> Option<queue::WorkerBuilder> {
         let store = self.store.clone();
         let clean_up = move |context: JobContext| -> BoxFuture<'static, ()> {
             let store = store.clone();
-            Box::pin(async move { objects::clean_up_earlier_attempts(&store, &context).await })
+            Box::pin(async move {
+                let own = key::job_prefix(context.run_id().0, context.id().0);
+                objects::clean_up_earlier_attempts(&store, &context, &own).await;
+            })
         };
         (config.concurrency > 0).then(|| {
             queue::Worker::builder(self.pool.clone())
@@ -59,6 +64,12 @@ impl Resources {
                 .grace(config.shutdown_grace)
                 .before_attempt(clean_up)
         })
+    }
+
+    /// A handler that also writes the files of a version, as a worker is to run it: before every attempt it removes what earlier
+    /// ones left of these.
+    pub fn making_versions<H: MakesVersion>(&self, handler: H) -> impl Handler<Job = H::Job> {
+        CleanStart { store: self.store.clone(), handler }
     }
 
     /// What a `run.json` that this job writes comes from.
@@ -100,7 +111,18 @@ impl Resources {
     /// # Errors
     /// As [`objects::read`].
     pub async fn read_artefact(&self, artefact: &Artefact, max_bytes: u64) -> Result<Bytes, JobError> {
-        let input = Input { name: &artefact.name, store_key: &artefact.store_key, blake3: &artefact.blake3 };
-        objects::read(&self.store, input, max_bytes).await
+        objects::read(&self.store, Input::from(artefact), max_bytes).await
+    }
+
+    /// Reads an artefact that was written with [`objects::write_json`].
+    ///
+    /// # Errors
+    /// As [`objects::read_json`].
+    pub async fn read_json<T: DeserializeOwned>(
+        &self,
+        artefact: &Artefact,
+        max_bytes: u64,
+    ) -> Result<T, JobError> {
+        objects::read_json(&self.store, Input::from(artefact), max_bytes).await
     }
 }

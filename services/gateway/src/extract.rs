@@ -5,6 +5,7 @@ use axum::{
     extract::{FromRequest, FromRequestParts, RawPathParams, Request, rejection::BytesRejection},
     http::{Method, StatusCode, header, request::Parts},
 };
+use formats::media_type;
 use serde::{Deserialize, de::DeserializeOwned};
 
 use crate::{App, error::Error, idempotency::RequestKey, json, names::as_id, query};
@@ -94,7 +95,7 @@ pub(crate) struct NoFields {}
 fn check_is_json(headers: &axum::http::HeaderMap) -> Result<(), Error> {
     let found = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("none");
     let essence = found.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
-    if essence == "application/json" || (essence.starts_with("application/") && essence.ends_with("+json")) {
+    if essence == media_type::JSON || (essence.starts_with("application/") && essence.ends_with("+json")) {
         Ok(())
     } else {
         Err(Error::UnsupportedMediaType(format!("content type is {found}, expected application/json")))

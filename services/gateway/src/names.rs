@@ -1,5 +1,6 @@
 //! Names that people give to things, and ids that the gateway gives them.
 
+use formats::media_type::{BINARY, CSV, JSON, MP4, PNG, TAR, TEXT};
 use uuid::Uuid;
 
 use crate::error::{Error, Result};
@@ -71,17 +72,17 @@ pub fn check_versioned_name(what: &str, name: &str) -> Result<()> {
 pub(crate) fn media_type(name: &str) -> &'static str {
     let lower = name.to_ascii_lowercase();
     match lower.rsplit('.').next() {
-        Some("csv") => "text/csv; charset=utf-8",
-        Some("asf" | "amc" | "bvh" | "trc") => "text/plain; charset=utf-8",
-        Some("json") => "application/json",
-        Some("png") => "image/png",
+        Some("csv") => CSV,
+        Some("asf" | "amc" | "bvh" | "trc") => TEXT,
+        Some("json") => JSON,
+        Some("png") => PNG,
         Some("jpg" | "jpeg") => "image/jpeg",
-        Some("mp4" | "m4v") => "video/mp4",
+        Some("mp4" | "m4v") => MP4,
         Some("zip") => "application/zip",
         Some("gz" | "tgz") => "application/gzip",
         Some("zst" | "tzst") => "application/zstd",
-        Some("tar") => "application/x-tar",
-        _ => "application/octet-stream",
+        Some("tar") => TAR,
+        _ => BINARY,
     }
 }
 

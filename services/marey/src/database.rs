@@ -165,23 +165,23 @@ impl std::str::FromStr for Augmentation {
 /// If a way is there twice, or a speed is none that the server takes.
 fn augment(ways: &[Augmentation]) -> anyhow::Result<Augment> {
     let mut mirror = false;
-    let mut warps = Vec::new();
+    let mut speeds = Vec::new();
     for way in ways {
         match way {
             Augmentation::Mirror => {
                 ensure!(!mirror, "--augment has mirror twice, expected each way once");
                 mirror = true;
             }
-            Augmentation::Warp => warps.extend([0.8, 1.25]),
-            Augmentation::WarpTo(speed) => warps.push(*speed),
+            Augmentation::Warp => speeds.extend([0.8, 1.25]),
+            Augmentation::WarpTo(speed) => speeds.push(*speed),
         }
     }
-    let augment = Augment { mirror, warps };
+    let augment = Augment { mirror, speeds };
     augment.check().map_err(|error| match error {
-        Error::WarpTwice { found } => {
+        Error::SpeedTwice { found } => {
             anyhow!("--augment has the speed {found} twice, expected each once; warp is 0.8 and 1.25")
         }
-        Error::Warp { found } => {
+        Error::Speed { found } => {
             anyhow!("--augment has warp={}, expected a speed of 0.25 to 4 other than 1", shown(found))
         }
         other => anyhow!("--augment: {other}"),

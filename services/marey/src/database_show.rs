@@ -3,10 +3,9 @@
 use std::fmt::Write;
 
 use client::MotionDatabase;
-use model::shown_rate;
+use jobs::motion_database::{Augment, Clip, Contents, Share};
+use model::{counted, shown_rate};
 use serde::Deserialize;
-
-use model::counted;
 
 /// A motion database and what is in it.
 #[derive(Debug, Deserialize)]
@@ -29,30 +28,6 @@ pub struct Details {
 }
 
 #[derive(Debug, Deserialize)]
-struct Contents {
-    frame_rate_hz: f64,
-    num_joints: usize,
-    num_dofs: usize,
-    actions: Vec<Share>,
-    subjects: Vec<Share>,
-    augment: Augment,
-    warnings: Vec<String>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Share {
-    name: String,
-    num_clips: u64,
-    num_poses: u64,
-}
-
-#[derive(Debug, Deserialize)]
-struct Augment {
-    mirror: bool,
-    warps: Vec<f64>,
-}
-
-#[derive(Debug, Deserialize)]
 struct Model {
     method: String,
     bytes: u64,
@@ -64,15 +39,6 @@ struct User {
     run_id: Option<String>,
     session: Option<String>,
     motion_database: Option<String>,
-}
-
-/// A clip.
-#[derive(Debug, Deserialize)]
-pub struct Clip {
-    name: String,
-    subject: String,
-    action: String,
-    num_poses: u64,
 }
 
 /// All of it, for people.
@@ -119,7 +85,7 @@ pub fn description(details: &Details) -> String {
                 shown_rate(contents.frame_rate_hz)
             ),
         );
-        line("augmented", contents.augment.in_words());
+        line("augmented", augmented(&contents.augment));
     }
     for user in &details.used_by {
         line("in use by", user.in_words());
@@ -134,11 +100,9 @@ pub fn description(details: &Details) -> String {
     out
 }
 
-impl Augment {
-    fn in_words(&self) -> String {
-        let speeds = self.warps.iter().map(|speed| format!("at {speed} times the speed"));
-        self.mirror.then(|| "mirrored".to_owned()).into_iter().chain(speeds).collect::<Vec<_>>().join(", ")
-    }
+fn augmented(Augment { mirror, speeds }: &Augment) -> String {
+    let speeds = speeds.iter().map(|speed| format!("at {speed} times the speed"));
+    mirror.then(|| "mirrored".to_owned()).into_iter().chain(speeds).collect::<Vec<_>>().join(", ")
 }
 
 impl User {

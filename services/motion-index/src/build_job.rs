@@ -1,31 +1,30 @@
 //! The job that puts the parts of a motion database together and writes its index files.
 
 use crate::{
-    contents::{Clip, Contents, shares, shortened},
+    contents::{shares, shortened},
     plan_job::no_database,
     shards,
     sources::Sources,
 };
 use jobs::{
-    motion_database::{BuildMotionDatabase, PlanMotionDatabase},
-    run_json::{Origin, RUN_JSON, RunReport, Timings},
+    motion_database::{BuildMotionDatabase, Clip, Contents, PlanMotionDatabase},
+    run_json::{Origin, RunReport, Timings},
 };
 use library::{
     AllCores,
     motion_database::{INDEX, SHARDS, Shard, ShardList, ShardedClip},
+    versions::{Built, motion_databases::BuiltDatabase},
 };
 use model::counted;
 use motion_db::MotionDatabase;
-use queue::{Handler, JobContext, JobError, Outcome};
-use results::{ResultFile, media_type::JSON};
+use queue::{Handler, JobContext, JobError, JobId, Outcome};
+use results::ResultFile;
 use serde::Serialize;
 use serde_json::json;
-use service::{Resources, compute, objects};
-use sqlx::{PgConnection, types::Json};
+use service::{MakesVersion, Resources, compute};
 use std::io::{BufWriter, Seek};
 use store::{Key, Stored, UploadLimits, key};
 use tokio_util::io::ReaderStream;
-use uuid::Uuid;
 
 /// What writing the windows of a pose takes beside the pose, bytes.
 const WRITING_BYTES: usize = 500;
@@ -38,14 +37,18 @@ pub(crate) struct BuildHandler {
     pub resources: Resources,
 }
 
+impl MakesVersion for BuildHandler {
+    fn version_prefix(job: &BuildMotionDatabase, id: JobId) -> Key {
+        key::motion_database_job_prefix(job.request.motion_database.id, id.0)
+    }
+}
+
 impl Handler for BuildHandler {
     type Job = BuildMotionDatabase;
 
     async fn run(&self, context: JobContext, job: BuildMotionDatabase) -> Result<Outcome, JobError> {
         let BuildMotionDatabase { request, plan } = job;
         let (store, id) = (&self.resources.store, request.motion_database.id);
-        let own = key::motion_database_job_prefix(id, context.id().0);
-        objects::clean_up_earlier_attempts_under(store, &context, &own).await;
         context.progress(0.0, "listing clips");
         let sources = Sources::find(&context, &self.resources, &request).await?;
         let written = self.write(&context, &request, &sources).await?;
@@ -62,17 +65,19 @@ impl Handler for BuildHandler {
             warnings: shortened(warnings),
         };
         let num_poses = clips.iter().map(|clip| clip.num_poses).sum();
-        let ready = Ready { id, written, num_poses, contents, clips };
+        let Written { stored, bytes, num_shards, skeleton, .. } = written;
+        let built = Built { id, stored, bytes, contents };
+        let database = BuiltDatabase { built, num_poses, num_shards, skeleton, clips };
         let build = self.resources.job_report(&context, num_poses);
         let timings = Timings::default().one("plan", &plan).all("imports", &imports).one("build", &build);
         let files = vec![
-            ResultFile::json(SUMMARY, &Summary::from(&ready))?,
-            run_json(self.resources.origin(&context), &request, &ready, timings)?,
+            ResultFile::json(SUMMARY, &Summary::from(&database))?,
+            run_json(self.resources.origin(&context), &request, &database, timings)?,
         ];
         let files = results::write(store, &context, files, 0.98..1.0).await?;
         Ok(Outcome::default().artefacts(files).on_complete(move |connection| {
-            let ready = ready.clone();
-            Box::pin(async move { set_ready(connection, &ready).await })
+            let database = database.clone();
+            Box::pin(async move { database.set_ready(connection).await })
         }))
     }
 }
@@ -81,19 +86,20 @@ impl Handler for BuildHandler {
 fn run_json(
     origin: Origin,
     request: &PlanMotionDatabase,
-    ready: &Ready,
+    database: &BuiltDatabase,
     timings: Timings<'_>,
 ) -> Result<ResultFile, JobError> {
-    let warnings = &ready.contents.warnings;
+    let BuiltDatabase { built, num_poses, num_shards, clips, .. } = database;
+    let warnings = &built.contents.warnings;
     let report = RunReport { origin, warnings, timings, frames: None, points: None };
     let built = json!({
-        "num_poses": ready.num_poses,
-        "num_clips": ready.clips.len(),
-        "num_shards": ready.written.num_shards,
-        "bytes": ready.written.bytes,
-        "blake3": ready.written.stored.blake3,
+        "num_poses": num_poses,
+        "num_clips": clips.len(),
+        "num_shards": num_shards,
+        "bytes": built.bytes,
+        "blake3": built.stored.blake3,
     });
-    Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(request, json!({ "built": built }))?))
+    results::run_json(&report, request, json!({ "built": built }))
 }
 
 /// The index files of a database, or the one.
@@ -269,16 +275,6 @@ fn list(sources: &Sources, shard_of: &[usize], stored: &[Stored]) -> ShardList {
     }
 }
 
-/// What makes a row of `motion_databases` ready.
-#[derive(Debug, Clone)]
-struct Ready {
-    id: Uuid,
-    written: Written,
-    num_poses: usize,
-    contents: Contents,
-    clips: Vec<Clip>,
-}
-
 /// `summary.json`.
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -290,42 +286,14 @@ struct Summary<'a> {
     clips: &'a [Clip],
 }
 
-impl<'a> From<&'a Ready> for Summary<'a> {
-    fn from(ready: &'a Ready) -> Self {
+impl<'a> From<&'a BuiltDatabase> for Summary<'a> {
+    fn from(database: &'a BuiltDatabase) -> Self {
         Self {
-            num_poses: ready.num_poses,
-            skeleton: &ready.written.skeleton,
-            num_shards: ready.written.num_shards,
-            contents: &ready.contents,
-            clips: &ready.clips,
+            num_poses: database.num_poses,
+            skeleton: &database.skeleton,
+            num_shards: database.num_shards,
+            contents: &database.built.contents,
+            clips: &database.clips,
         }
     }
-}
-
-async fn set_ready(connection: &mut PgConnection, ready: &Ready) -> Result<(), JobError> {
-    let number = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
-    let sql = "UPDATE motion_databases
-               SET store_key = $2, bytes = $3, blake3 = $4, num_poses = $5, num_clips = $6, num_shards = $7,
-                   skeleton = $8, contents = $9, clips = $10, ready_at = clock_timestamp()
-               WHERE id = $1 AND store_key IS NULL";
-    let Written { stored, bytes, num_shards, skeleton, .. } = &ready.written;
-    let updated = sqlx::query(sql)
-        .bind(ready.id)
-        .bind(stored.key.as_str())
-        .bind(i64::try_from(*bytes).unwrap_or(i64::MAX))
-        .bind(&stored.blake3)
-        .bind(number(ready.num_poses))
-        .bind(number(ready.clips.len()))
-        .bind(i32::try_from(*num_shards).unwrap_or(i32::MAX))
-        .bind(skeleton)
-        .bind(Json(&ready.contents))
-        .bind(Json(&ready.clips))
-        .execute(connection)
-        .await?
-        .rows_affected();
-    if updated == 1 {
-        return Ok(());
-    }
-    let detail = format!("no row of motion_databases with id {} waits for an index", ready.id);
-    Err(JobError::give_up("the motion database was deleted or built by another run meanwhile", detail))
 }

@@ -1,42 +1,10 @@
 //! What is in a motion database: what people are told of it.
 
-use jobs::motion_database::{Augment, PartClip};
-use serde::Serialize;
+use jobs::motion_database::{Clip, PartClip, Share};
 use std::collections::BTreeMap;
 
 /// Most warnings that are kept; a bad archive has one a file.
 const MAX_WARNINGS: usize = 100;
-
-/// `motion_databases.contents`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Contents {
-    pub frame_rate_hz: f64,
-    pub num_joints: usize,
-    pub num_dofs: usize,
-    /// by name; empty where it is not known
-    pub actions: Vec<Share>,
-    /// by name
-    pub subjects: Vec<Share>,
-    pub augment: Augment,
-    pub warnings: Vec<String>,
-}
-
-/// How much of a database one action or subject is.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct Share {
-    pub name: String,
-    pub num_clips: usize,
-    pub num_poses: usize,
-}
-
-/// One of `motion_databases.clips`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct Clip {
-    pub name: String,
-    pub subject: String,
-    pub action: String,
-    pub num_poses: usize,
-}
 
 /// How much of `clips` goes by each name.
 pub(crate) fn shares(clips: &[Clip], name: impl Fn(&Clip) -> &str) -> Vec<Share> {

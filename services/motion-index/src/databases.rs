@@ -1,9 +1,10 @@
 //! Databases and what is worked out from them, kept in memory up to a bound.
 
-use crate::{Error, catalogue, catalogue::Row, search};
+use crate::{Error, search};
 use library::{
     AllCores, Cache,
     motion_database::{self, Index, Opened, ShardList},
+    versions::motion_databases::{self, ReadyDatabase},
 };
 use motion_db::{MotionDatabase, WindowIndex};
 use service::{compute, config::MemoryConfig};
@@ -61,8 +62,8 @@ impl Databases {
     }
 
     /// The row of a database, and the list of its shards if it has several.
-    pub async fn find(&self, id: Uuid) -> Result<(Row, Arc<Option<ShardList>>), Error> {
-        let row = catalogue::find(&self.pool, id).await?;
+    pub async fn find(&self, id: Uuid) -> Result<(ReadyDatabase, Arc<Option<ShardList>>), Error> {
+        let row = self.row(id).await?;
         if row.num_shards.unwrap_or(1) == 1 {
             return Ok((row, Arc::new(None)));
         }
@@ -79,10 +80,18 @@ impl Databases {
         Ok((row, list))
     }
 
+    async fn row(&self, id: Uuid) -> Result<ReadyDatabase, Error> {
+        match motion_databases::find(&self.pool, id).await? {
+            Some(row) => Ok(row),
+            None if motion_databases::exists(&self.pool, id).await? => Err(Error::NotReady(id)),
+            None => Err(Error::NoSuchDatabase(id)),
+        }
+    }
+
     /// An index file, opened. `row` and `list` are the database's.
     pub async fn open(
         &self,
-        row: &Row,
+        row: &ReadyDatabase,
         list: &Option<ShardList>,
         shard: Option<usize>,
     ) -> Result<Arc<Opened>, Error> {

@@ -5,6 +5,7 @@ use crate::{
     plan_job::no_database,
 };
 use bytes::Bytes;
+use formats::media_type::BINARY;
 use jobs::{
     Object,
     motion_database::{ImportMotion, PartClip, PartReport},
@@ -42,14 +43,11 @@ impl Handler for ImportHandler {
         context.check()?;
         let num_poses = clips.iter().map(|clip| clip.num_poses).sum();
         let report = PartReport { clips, warnings, job: self.resources.job_report(&context, num_poses) };
-        let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
-        let report =
-            objects::write(&self.resources.store, &context, REPORT, "application/json", report).await?;
+        let store = &self.resources.store;
+        let report = objects::write_json(store, &context, REPORT, &report).await?;
         let mut outcome = Outcome::default().artefact(report);
         if let Some(part) = part {
-            let part =
-                objects::write(&self.resources.store, &context, PART, "application/octet-stream", part)
-                    .await?;
+            let part = objects::write(store, &context, PART, BINARY, part).await?;
             outcome = outcome.artefact(part);
         }
         Ok(outcome)
@@ -74,7 +72,7 @@ fn import(
     let basis = MotionDatabase::from_bytes(basis).map_err(JobError::retry)?;
     let motions = inputs::unpack_packed(motions)?;
     let mut reader = Reader::new(inputs::unpack_packed(skeletons)?, payload.bvh_metres_per_unit);
-    let augment = Augment { mirror: payload.augment.mirror, speeds: payload.augment.warps.clone() };
+    let augment = Augment { mirror: payload.augment.mirror, speeds: payload.augment.speeds.clone() };
     let mut part = basis.emptied();
     let (mut clips, mut warnings) = (Vec::new(), Vec::new());
     let num_files = motions.len();

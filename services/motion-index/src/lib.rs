@@ -12,7 +12,6 @@
 //! they are first asked for and kept in memory up to a bound; the shards of large ones are kept by several replicas.
 
 mod build_job;
-mod catalogue;
 pub mod config;
 mod contents;
 mod databases;
@@ -70,8 +69,8 @@ pub async fn start(
         builder
             .handler(plan_job::PlanHandler { resources: resources.clone() })
             .handler(import_job::ImportHandler { resources: resources.clone() })
-            .handler(build_job::BuildHandler { resources: resources.clone() })
-            .handler(train_job::TrainHandler { resources })
+            .handler(resources.making_versions(build_job::BuildHandler { resources: resources.clone() }))
+            .handler(resources.making_versions(train_job::TrainHandler { resources: resources.clone() }))
     });
     let parts = Parts {
         name: NAME,

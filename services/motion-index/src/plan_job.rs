@@ -1,7 +1,11 @@
 //! The job that divides the files of a motion database into parts, and decides the coordinates that all parts have.
 
 use crate::inputs::{self, Reader};
-use formats::{archive::Entry, motion_files::FileUse};
+use formats::{
+    archive::Entry,
+    media_type::{BINARY, TAR},
+    motion_files::FileUse,
+};
 use jobs::{
     Object,
     motion_database::{BuildMotionDatabase, ImportMotion, MotionDatabaseFile, PlanMotionDatabase},
@@ -23,7 +27,6 @@ const PART_BYTES: usize = 32 << 20;
 const MAX_SUPPORT_BYTES: usize = 64 << 20;
 /// Clips that the coordinates are taken from, at most.
 const SAMPLE_CLIPS: usize = 24;
-const TAR: &str = "application/x-tar";
 
 pub(crate) struct PlanHandler {
     pub resources: Resources,
@@ -46,8 +49,7 @@ impl Handler for PlanHandler {
             let basis = compute::run(move || one_clip(&basis)).await?;
             let skeletons = divided.skeletons.clone();
             let skeletons = compute::run(move || inputs::pack(&skeletons)).await?;
-            let basis =
-                objects::write(store, &context, "basis.mdb", "application/octet-stream", basis).await?;
+            let basis = objects::write(store, &context, "basis.mdb", BINARY, basis).await?;
             let skeletons = objects::write(store, &context, "skeletons.tar", TAR, skeletons).await?;
             for part in &divided.parts {
                 imports.push(ChildJob::new(&ImportMotion {

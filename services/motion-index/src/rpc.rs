@@ -1,8 +1,11 @@
 //! `marey.v1.MotionIndex`: wire to question, answer to wire.
 
-use crate::{Error, catalogue, catalogue::Row, fan_out::FanOut, search::Match};
+use crate::{Error, fan_out::FanOut, search::Match};
 use futures::{Stream, StreamExt};
-use library::motion_database::{ShardList, ShardedClip};
+use library::{
+    motion_database::{ShardList, ShardedClip},
+    versions::motion_databases::{self, ReadyDatabase},
+};
 use motion_db::{ClipInfo, FRAME_RATE, MotionDatabase};
 use proto::v1::{self, motion_index_server::MotionIndex};
 use std::{pin::Pin, sync::Arc};
@@ -35,7 +38,9 @@ impl MotionIndex for Rpc {
         };
         let size = if request.page_size == 0 { PAGE_SIZE } else { request.page_size.min(PAGE_SIZE) };
         let mut rows =
-            catalogue::list(self.fan_out.databases.pool(), project, after, i64::from(size) + 1).await?;
+            motion_databases::list(self.fan_out.databases.pool(), project, after, i64::from(size) + 1)
+                .await
+                .map_err(Error::from)?;
         let is_more = rows.len() > size as usize;
         rows.truncate(size as usize);
         let next_page_token = rows.last().filter(|_| is_more).map(|r| r.id.to_string()).unwrap_or_default();
@@ -130,7 +135,7 @@ fn pose(found: Match) -> v1::DatabasePose {
     v1::DatabasePose { clip: found.clip, frame: u32::try_from(found.frame).unwrap_or(u32::MAX) }
 }
 
-fn summary(row: &Row) -> v1::DatabaseSummary {
+fn summary(row: &ReadyDatabase) -> v1::DatabaseSummary {
     v1::DatabaseSummary {
         id: row.id.to_string(),
         name: row.name.clone(),
@@ -144,7 +149,11 @@ fn summary(row: &Row) -> v1::DatabaseSummary {
     }
 }
 
-fn describe(row: &Row, list: &Option<ShardList>, database: &MotionDatabase) -> v1::DescribeDatabaseResponse {
+fn describe(
+    row: &ReadyDatabase,
+    list: &Option<ShardList>,
+    database: &MotionDatabase,
+) -> v1::DescribeDatabaseResponse {
     let clip = |name: &String, subject: &String, action: &String, num_poses: usize| v1::DatabaseClip {
         name: name.clone(),
         subject: subject.clone(),

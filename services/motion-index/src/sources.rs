@@ -1,13 +1,13 @@
 //! Where the clips of a database come from: the index files of the version before, and the parts that were imported.
 
 use crate::{
-    contents::{Clip, Names, names},
+    contents::{Names, names},
     import_job::{PART, REPORT},
     plan_job::full_name,
 };
 use jobs::{
     JobReport,
-    motion_database::{PartReport, PlanMotionDatabase},
+    motion_database::{Clip, PartReport, PlanMotionDatabase},
 };
 use library::{motion_database, motion_database::Shard};
 use motion_db::{MotionDatabase, trial_name};
@@ -61,8 +61,7 @@ impl Sources {
             context.check()?;
             let named = |name: &str| left.iter().map(|a| &a.artefact).find(|a| a.name == name);
             let Some(report) = named(REPORT) else { continue };
-            let report = resources.read_artefact(report, u64::MAX).await?;
-            let report: PartReport = serde_json::from_slice(&report).map_err(JobError::retry)?;
+            let report: PartReport = resources.read_json(report, u64::MAX).await?;
             sources.add_part(report, named(PART));
         }
         Ok(sources)

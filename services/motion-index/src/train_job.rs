@@ -3,16 +3,14 @@
 use crate::plan_job::full_name;
 use jobs::{
     motion_database::TrainGplvm,
-    run_json::{RUN_JSON, RunReport, Timings},
+    run_json::{RunReport, Timings},
 };
-use library::motion_database;
-use queue::{Handler, JobContext, JobError, Outcome};
-use results::{ResultFile, media_type::JSON};
+use library::{motion_database, versions::motion_databases};
+use queue::{Handler, JobContext, JobError, JobId, Outcome};
 use serde_json::json;
-use service::{Resources, compute, objects};
-use sqlx::{PgConnection, types::Json};
+use service::{MakesVersion, Resources, compute};
 use std::ops::ControlFlow;
-use store::{Stored, key};
+use store::{Key, key};
 
 /// Name of the model in the object store.
 const MODEL: &str = "gplvm.model";
@@ -21,14 +19,18 @@ pub(crate) struct TrainHandler {
     pub resources: Resources,
 }
 
+impl MakesVersion for TrainHandler {
+    fn version_prefix(job: &TrainGplvm, id: JobId) -> Key {
+        key::motion_database_job_prefix(job.motion_database.id, id.0)
+    }
+}
+
 impl Handler for TrainHandler {
     type Job = TrainGplvm;
 
     async fn run(&self, context: JobContext, request: TrainGplvm) -> Result<Outcome, JobError> {
         let Resources { store, memory, .. } = &self.resources;
         let file = &request.motion_database;
-        let own = key::motion_database_job_prefix(file.id, context.id().0);
-        objects::clean_up_earlier_attempts_under(store, &context, &own).await;
         context.progress(0.0, "reading the motion database");
         let most = memory.cache_bytes;
         let opened = motion_database::open(store, &file.store_key, &file.blake3, most).await;
@@ -56,42 +58,11 @@ impl Handler for TrainHandler {
         let origin = self.resources.origin(&context);
         let report = RunReport { origin, warnings: &[], timings, frames: None, points: None };
         let built = json!({ "bytes": stored.bytes, "blake3": stored.blake3 });
-        let report = report.to_json(&request, json!({ "built": built }))?;
-        let report = ResultFile::ready(RUN_JSON, JSON, report);
+        let report = results::run_json(&report, &request, json!({ "built": built }))?;
         let report = results::write_one(store, &context, report).await?;
         Ok(Outcome::default().artefact(report).on_complete(move |connection| {
             let (request, stored) = (request.clone(), stored.clone());
-            Box::pin(async move { record(connection, run, &request, &stored).await })
+            Box::pin(async move { motion_databases::set_gplvm(connection, run, &request, &stored).await })
         }))
     }
-}
-
-async fn record(
-    connection: &mut PgConnection,
-    run: uuid::Uuid,
-    request: &TrainGplvm,
-    stored: &Stored,
-) -> Result<(), JobError> {
-    // Of a database that was deleted meanwhile there is nothing to record.
-    let sql = "INSERT INTO motion_database_models
-                   (motion_database_id, method, train_run_id, parameters, store_key, bytes, blake3)
-               SELECT id, 'gplvm', $2, $3, $4, $5, $6 FROM motion_databases WHERE id = $1
-               ON CONFLICT (motion_database_id, method) DO UPDATE
-               SET train_run_id = excluded.train_run_id, parameters = excluded.parameters,
-                   store_key = excluded.store_key, bytes = excluded.bytes, blake3 = excluded.blake3,
-                   trained_at = clock_timestamp()";
-    let recorded = sqlx::query(sql)
-        .bind(request.motion_database.id)
-        .bind(run)
-        .bind(Json(&request.parameters))
-        .bind(stored.key.as_str())
-        .bind(i64::try_from(stored.bytes).unwrap_or(i64::MAX))
-        .bind(&stored.blake3)
-        .execute(connection)
-        .await?
-        .rows_affected();
-    if recorded == 1 {
-        return Ok(());
-    }
-    Err(JobError::give_up("the motion database was deleted meanwhile", request.motion_database.id))
 }

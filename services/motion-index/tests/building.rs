@@ -97,7 +97,7 @@ async fn recordings_are_mirrored_and_warped_and_what_is_made_of_a_trial_goes_wit
     let fixture = Fixture::new().await;
     let id = fixture.new_database("walks").await;
     let files = fixture.walks(id, &[1, 2], 240).await;
-    let augment = Augment { mirror: true, warps: vec![0.8, 1.25] };
+    let augment = Augment { mirror: true, speeds: vec![0.8, 1.25] };
     let first = fixture.build(&PlanMotionDatabase { augment: augment.clone(), ..plan(id, files) }).await;
     let database = fixture.open(&first).await;
     assert_eq!(database.clips().len(), 2 * augment.copies());

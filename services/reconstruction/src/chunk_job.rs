@@ -1,6 +1,7 @@
 //! The job that reconstructs one chunk.
 
 use crate::{Shared, error::InputError};
+use formats::media_type::BINARY;
 use jobs::sparse::ReconstructChunk;
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::{compute, objects};
@@ -47,12 +48,8 @@ impl Handler for ChunkHandler {
         .await?;
         context.check()?;
         let report = resources.job_report(&context, frames);
-        let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
-        Ok(Outcome::default()
-            .artefact(
-                objects::write(store, &context, CHUNK, "application/octet-stream", reconstruction.to_bytes())
-                    .await?,
-            )
-            .artefact(objects::write(store, &context, REPORT, "application/json", report).await?))
+        let chunk = objects::write(store, &context, CHUNK, BINARY, reconstruction.to_bytes()).await?;
+        let report = objects::write_json(store, &context, REPORT, &report).await?;
+        Ok(Outcome::default().artefact(chunk).artefact(report))
     }
 }

@@ -1,9 +1,10 @@
 //! The files that people get of a run from control points.
 
 use crate::feet::Finished;
+use formats::media_type::CSV;
 use model::{ChannelKind, Motion};
 use queue::JobError;
-use results::{Kind, ResultFile, cell, formats, media_type::CSV};
+use results::{Kind, ResultFile, cell, formats};
 use std::{fmt::Write as _, sync::Arc};
 
 impl results::Finished for Finished {

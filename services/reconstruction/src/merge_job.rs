@@ -49,12 +49,9 @@ impl MergeHandler {
         let artefacts = resources.artefacts_before(context).await?;
         let (mut parts, mut reports) = (Vec::new(), Vec::new());
         for artefact in &artefacts {
-            let read = resources.read_artefact(artefact, limit);
             match artefact.name.as_str() {
-                chunk_job::CHUNK => parts.push(read.await?),
-                chunk_job::REPORT => {
-                    reports.push(serde_json::from_slice(&read.await?).map_err(JobError::retry)?)
-                }
+                chunk_job::CHUNK => parts.push(resources.read_artefact(artefact, limit).await?),
+                chunk_job::REPORT => reports.push(resources.read_json(artefact, limit).await?),
                 _ => {}
             }
             context.check()?;

@@ -7,6 +7,7 @@ use crate::{
     inputs::{self, Evidence, NamedBytes},
     performer,
 };
+use formats::media_type::BINARY;
 use jobs::{
     InputFile, JobReport, Object,
     sparse::{FittedReport, MergeChunks, PlanSparse, ReconstructChunk},
@@ -66,8 +67,7 @@ impl Handler for PlanHandler {
         context.check()?;
         // Its chunks, which are nearly all of the work, are not counted before it is done.
         context.progress(0.02, "planning");
-        let artefact =
-            objects::write(store, &context, "session.bin", "application/octet-stream", bytes).await?;
+        let artefact = objects::write(store, &context, "session.bin", BINARY, bytes).await?;
         let session = Object::from(&artefact);
         let report = resources.job_report(&context, evidence.session.num_frames());
         Ok(Outcome::default()

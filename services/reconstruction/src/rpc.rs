@@ -3,6 +3,7 @@
 use crate::{Shared, error::CallError, ik, priors::Prior};
 use jobs::motion_database::MotionDatabaseFile;
 use kinematics::{Kinematics, Parametrisation, control_points};
+use library::versions::motion_databases;
 use model::{PointTrajectories, Skeleton};
 use proto::v1::{self, reconstruction_server::Reconstruction, solve_inverse_kinematics_request::Performer};
 use service::{FileError, compute::Slots};
@@ -74,8 +75,8 @@ impl Rpc {
 impl Shared {
     /// A motion database that is ready.
     pub(crate) async fn motion_database(&self, id: Uuid) -> Result<MotionDatabaseFile, CallError> {
-        let found = library::motion_database::find(&self.resources.pool, id).await?;
-        found.ok_or(CallError::NoSuchDatabase(id))
+        let found = motion_databases::find(&self.resources.pool, id).await?;
+        found.map(MotionDatabaseFile::from).ok_or(CallError::NoSuchDatabase(id))
     }
 }
 

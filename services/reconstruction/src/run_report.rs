@@ -3,11 +3,11 @@
 use crate::feet::{Finished, FootReport};
 use jobs::{
     JobReport,
-    run_json::{Origin, RUN_JSON, RunReport, Timings},
+    run_json::{Origin, RunReport, Timings},
     sparse::{FittedReport, MergeChunks},
 };
 use queue::JobError;
-use results::{ResultFile, media_type::JSON};
+use results::ResultFile;
 use serde::Serialize;
 use sparse::FrameQuality;
 
@@ -57,7 +57,7 @@ pub(crate) fn file(
         quality: summary(quality),
         feet: finished.feet.as_ref().map(|feet| &feet.report),
     };
-    Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(&job.request, own)?))
+    results::run_json(&report, &job.request, own)
 }
 
 /// Frames that fit badly or were not measured, from a twentieth of all on.

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use camera_jobs::tracking_session;
+use formats::media_type::BINARY;
 use jobs::{
     JobReport,
     multi_view::{MergeTracks, TRACKED, TrackingSession},
     named,
 };
 use queue::{Handler, JobContext, JobError, Outcome};
-use results::media_type::BINARY;
 use service::{compute, objects};
 use tracking::{Chunk, Stage, hold_unseen, merge};
 
@@ -65,8 +65,7 @@ impl MergeHandler {
             let bytes = resources.read_artefact(artefact, MAX_CHUNK_BYTES).await?;
             chunks.push(Chunk::from_bytes(&bytes).map_err(JobError::retry)?);
             let report = named(&artefacts, &report_name(index))?;
-            let bytes = resources.read_artefact(report, MAX_CHUNK_BYTES).await?;
-            reports.push(serde_json::from_slice(&bytes).map_err(JobError::retry)?);
+            reports.push(resources.read_json(report, MAX_CHUNK_BYTES).await?);
         }
         let model = models.get(&session.request.body_model).await?;
         let session = session.clone();

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use body::BodyModel;
+use body::{BodyModel, MAX_DEVIATIONS};
 use camera_jobs::views;
 use proto::v1::{self, RefineAnnealing, RefineStage};
 use tracking::{Annealing, ObservedFrame, Options, Part, ParticleOptions, Stage, Tracked, Tracker};
@@ -11,8 +11,6 @@ use crate::{InputError, error::CallError};
 
 /// Most silhouettes.
 const MAX_VIEWS: usize = 64;
-/// Largest coefficient, standard deviations.
-const MOST_ALPHA: f64 = 6.0;
 /// Most particles times iterations: some seconds on one core.
 const MOST_WORK: u32 = 40_000;
 
@@ -27,7 +25,7 @@ pub(crate) fn check(request: &v1::RefineFrameRequest) -> Result<(), proto::Error
         let (what, found) = ("silhouettes", request.silhouettes.len());
         return Err(proto::Error::Count { what, found, expected });
     }
-    if let Some(found) = request.alpha.iter().find(|a| a.is_nan() || a.abs() > MOST_ALPHA) {
+    if let Some(found) = request.alpha.iter().find(|a| a.is_nan() || a.abs() > MAX_DEVIATIONS) {
         return Err(out_of_range("alpha", found, "-6 to 6 standard deviations"));
     }
     let ParticleOptions { particles, iterations, .. } = particles(&request.options.unwrap_or_default());

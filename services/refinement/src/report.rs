@@ -3,11 +3,11 @@
 use body::Limb;
 use jobs::{
     JobReport,
-    multi_view::{CameraReport, TrackingSession},
-    run_json::{Origin, RUN_JSON, RunReport, Timings},
+    multi_view::{CameraReport, TrackingSession, timings},
+    run_json::{Origin, RunReport},
 };
 use queue::JobError;
-use results::{ResultFile, media_type::JSON};
+use results::ResultFile;
 use serde_json::{Value, json};
 use tracking::{Stage, Tracked};
 
@@ -58,9 +58,7 @@ pub(crate) fn run_json(
     merge: &JobReport,
 ) -> Result<ResultFile, JobError> {
     let warnings = [&session.warnings[..], &doubts(finished)].concat();
-    let timings = Timings::default()
-        .one("plan", &session.plan)
-        .all("cameras", session.cameras.iter().map(|camera| &camera.job))
+    let timings = timings(Some(&session.plan), &session.cameras)
         .one("fit_shape", &session.fit_shape)
         .all("chunks", chunks)
         .one("merge", merge)
@@ -71,7 +69,7 @@ pub(crate) fn run_json(
     });
     let frames = Some((finished.tracked.frames.len(), finished.frame_rate));
     let report = RunReport { origin, warnings: &warnings, timings, frames, points: None };
-    Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(&session.request, own)?))
+    results::run_json(&report, &session.request, own)
 }
 
 /// Mean overlap of every camera, where it sees somebody.

@@ -4,6 +4,7 @@ use std::sync::{Arc, atomic::AtomicBool};
 
 use body::BodyModel;
 use camera_jobs::{Silhouettes, View, tracking_session};
+use formats::media_type::BINARY;
 use jobs::multi_view::{TrackChunk, TrackingSession};
 use queue::{Handler, JobContext, JobError, Outcome};
 use service::{
@@ -54,12 +55,8 @@ impl Handler for TrackHandler {
         context.check()?;
         let bytes = chunk?.to_bytes().map_err(InputError::from)?;
         let report = resources.job_report(&context, frames.len());
-        let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
-        let chunk =
-            objects::write(store, &context, &chunk_name(payload.chunk), "application/octet-stream", bytes)
-                .await?;
-        let report =
-            objects::write(store, &context, &report_name(payload.chunk), "application/json", report).await?;
+        let chunk = objects::write(store, &context, &chunk_name(payload.chunk), BINARY, bytes).await?;
+        let report = objects::write_json(store, &context, &report_name(payload.chunk), &report).await?;
         Ok(Outcome::default().artefact(chunk).artefact(report))
     }
 }

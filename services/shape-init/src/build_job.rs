@@ -6,17 +6,17 @@ use body::{LearnOptions, Learned, ScanOptions, ScanSet};
 use formats::archive::{self, Entry, Limits};
 use jobs::{
     InputFile,
-    body_model::{BuildBodyModel, VersionName},
-    run_json::{RUN_JSON, RunReport, Timings},
+    body_model::BuildBodyModel,
+    run_json::{RunReport, Timings},
 };
+use library::versions::{Built, body_models::BuiltBodyModel};
 use model::counted;
-use queue::{Handler, JobContext, JobError, Outcome};
-use results::{ResultFile, media_type::JSON};
+use queue::{Handler, JobContext, JobError, JobId, Outcome};
+use results::ResultFile;
 use serde::Serialize;
 use serde_json::{Value, json};
-use service::{FileError, compute, objects};
-use sqlx::{PgConnection, types::Json};
-use store::{Stored, key};
+use service::{FileError, MakesVersion, compute};
+use store::{Key, key};
 
 use crate::{InputError, Shared};
 
@@ -45,13 +45,17 @@ struct Contents {
     warnings: Vec<String>,
 }
 
+impl MakesVersion for BuildHandler {
+    fn version_prefix(job: &BuildBodyModel, id: JobId) -> Key {
+        key::body_model_job_prefix(job.body_model.id, id.0)
+    }
+}
+
 impl Handler for BuildHandler {
     type Job = BuildBodyModel;
 
     async fn run(&self, context: JobContext, request: BuildBodyModel) -> Result<Outcome, JobError> {
         let (store, id) = (&self.shared.resources.store, request.body_model.id);
-        let own = key::body_model_job_prefix(id, context.id().0);
-        objects::clean_up_earlier_attempts_under(store, &context, &own).await;
         let entries = self.unpack(&context, &request.files).await?;
         context.progress(0.3, "reading the scans");
         let options = ScanOptions { metres_per_unit: request.metres_per_unit };
@@ -95,19 +99,17 @@ impl Handler for BuildHandler {
             "bytes": stored.bytes,
             "blake3": stored.blake3,
         });
-        let run = run.to_json(&request, json!({ "built": own }))?;
-        let files = vec![ResultFile::json(SUMMARY, &contents)?, ResultFile::ready(RUN_JSON, JSON, run)];
+        let run = results::run_json(&run, &request, json!({ "built": own }))?;
+        let files = vec![ResultFile::json(SUMMARY, &contents)?, run];
         let written = results::write(store, &context, files, 0.97..1.0).await?;
-        let ready = Ready {
-            name: request.body_model,
-            stored,
+        let model = BuiltBodyModel {
+            built: Built { id, bytes: stored.bytes, stored, contents },
             num_vertices: learned.model.num_vertices(),
             num_components: learned.model.num_components(),
-            contents,
         };
         Ok(Outcome::default().artefacts(written).on_complete(move |connection| {
-            let ready = ready.clone();
-            Box::pin(async move { set_ready(connection, &ready).await })
+            let model = model.clone();
+            Box::pin(async move { model.set_ready(connection).await })
         }))
     }
 }
@@ -166,36 +168,4 @@ fn contents(set: &ScanSet, learned: &Learned, files: &[InputFile]) -> Contents {
             .collect(),
         warnings,
     }
-}
-
-#[derive(Debug, Clone)]
-struct Ready {
-    name: VersionName,
-    stored: Stored,
-    num_vertices: usize,
-    num_components: usize,
-    contents: Contents,
-}
-
-async fn set_ready(connection: &mut PgConnection, ready: &Ready) -> Result<(), JobError> {
-    // Of a model that was deleted meanwhile there is nothing to record.
-    let sql = "UPDATE body_models
-               SET store_key = $2, bytes = $3, blake3 = $4, num_vertices = $5, num_components = $6, contents = $7,
-                   ready_at = clock_timestamp()
-               WHERE id = $1 AND store_key IS NULL";
-    let updated = sqlx::query(sql)
-        .bind(ready.name.id)
-        .bind(ready.stored.key.as_str())
-        .bind(i64::try_from(ready.stored.bytes).unwrap_or(i64::MAX))
-        .bind(&ready.stored.blake3)
-        .bind(i32::try_from(ready.num_vertices).unwrap_or(i32::MAX))
-        .bind(i32::try_from(ready.num_components).unwrap_or(i32::MAX))
-        .bind(Json(&ready.contents))
-        .execute(connection)
-        .await?
-        .rows_affected();
-    if updated == 1 {
-        return Ok(());
-    }
-    Err(JobError::give_up("the body model was deleted meanwhile", ready.name.id))
 }

@@ -3,12 +3,10 @@
 use std::sync::Arc;
 
 use body::{BodyModel, Shape};
+use formats::media_type::{BINARY, PNG};
 use model::{Image, Mesh, Motion};
 use queue::JobError;
-use results::{
-    Body, Kind, ResultFile,
-    media_type::{BINARY, PNG},
-};
+use results::{Body, Kind, ResultFile};
 use shape_fit::Fit;
 
 use crate::InputError;

@@ -67,7 +67,7 @@ pub async fn start(config: Config, shutdown: CancellationToken) -> Result<Runnin
         ShapeInitServer::new(rpc::Rpc::new(shared.clone())).max_decoding_message_size(rpc::MAX_REQUEST_BYTES);
     let builder = shared.resources.worker(&config.worker).map(|builder| {
         builder
-            .handler(build_job::BuildHandler { shared: shared.clone() })
+            .handler(shared.resources.making_versions(build_job::BuildHandler { shared: shared.clone() }))
             .handler(plan_job::PlanHandler { shared: shared.clone() })
             .handler(silhouettes_job::SilhouettesHandler { shared: shared.clone() })
             .handler(shape_job::ShapeHandler { shared: shared.clone() })

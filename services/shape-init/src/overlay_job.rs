@@ -7,6 +7,7 @@ use std::{
 
 use body::{BodyModel, Posed};
 use camera_jobs::{Silhouettes, tracking_session};
+use formats::media_type::{MP4, TEXT};
 use jobs::{
     file_part,
     multi_view::{DrawOverlay, SourceKind, TRACKED},
@@ -14,10 +15,7 @@ use jobs::{
 };
 use model::{Camera, Image};
 use queue::{Handler, JobContext, JobError, Outcome};
-use results::{
-    ResultFile,
-    media_type::{MP4, TEXT},
-};
+use results::ResultFile;
 use service::compute::{self, StopOnDrop};
 use tempfile::TempDir;
 use tracking::{Chunk, Tracked};

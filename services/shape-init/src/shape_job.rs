@@ -7,13 +7,13 @@ use camera_jobs::reports;
 use formats::image_files;
 use jobs::{
     JobReport, Object, file_part,
-    multi_view::{CameraClips, CameraReport, FitShape, TrackingSession, picture_name},
-    run_json::{Origin, RUN_JSON, RunReport, Timings},
+    multi_view::{CameraClips, CameraReport, FitShape, TrackingSession, picture_name, timings},
+    run_json::{Origin, RunReport},
 };
 use model::Image;
 use multi_view::Parameters;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
-use results::{ResultFile, media_type::JSON};
+use results::ResultFile;
 use serde_json::json;
 use service::{Resources, compute, objects};
 use shape_fit::Fit;
@@ -106,8 +106,7 @@ impl Handler for ShapeHandler {
             warnings,
             request,
         };
-        let content = serde_json::to_vec(&session).map_err(JobError::retry)?;
-        let artefact = objects::write(store, &context, SESSION, JSON, content).await?;
+        let artefact = objects::write_json(store, &context, SESSION, &session).await?;
         let children = children(&session, &Object::from(&artefact))?;
         Ok(outcome.artefact(artefact).children(children))
     }
@@ -207,13 +206,10 @@ fn run_json(
     frames: (usize, f64),
     report: &JobReport,
 ) -> Result<ResultFile, JobError> {
-    let timings = Timings::default()
-        .one("plan", &job.plan)
-        .all("cameras", cameras.iter().map(|camera| &camera.job))
-        .one("fit_shape", report);
+    let timings = timings(Some(&job.plan), cameras).one("fit_shape", report);
     let own = json!({ "cameras": cameras.iter().map(CameraReport::summary).collect::<Vec<_>>() });
     let run = RunReport { origin, warnings: &job.warnings, timings, frames: Some(frames), points: None };
-    Ok(ResultFile::ready(RUN_JSON, JSON, run.to_json(&job.request, own)?))
+    results::run_json(&run, &job.request, own)
 }
 
 /// One past the last frame that all cameras have.

@@ -5,7 +5,11 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-use formats::{calibration::fit_to_image, image_files};
+use formats::{
+    calibration::fit_to_image,
+    image_files,
+    media_type::{BINARY, PNG},
+};
 use jobs::{
     file_part,
     multi_view::{
@@ -15,7 +19,7 @@ use jobs::{
 use model::Image;
 use multi_view::CameraRecord;
 use queue::{Artefact, Handler, JobContext, JobError, Outcome};
-use results::{ResultFile, media_type::PNG};
+use results::ResultFile;
 use service::{FileError, compute, objects};
 use tempfile::TempDir;
 use tokio::sync::mpsc;
@@ -63,8 +67,7 @@ impl Handler for SilhouettesHandler {
             matches: written.matches,
             job: resources.job_report(&context, made.made.end_frame - payload.parameters.first_frame),
         };
-        let report = serde_json::to_vec(&report).map_err(JobError::retry)?;
-        let report = objects::write(store, &context, &report_name(index), "application/json", report).await?;
+        let report = objects::write_json(store, &context, &report_name(index), &report).await?;
         Ok(written.artefacts.into_iter().fold(Outcome::default(), Outcome::artefact).artefact(report))
     }
 }
@@ -136,14 +139,12 @@ impl SilhouettesHandler {
         match piece {
             Piece::Clip { first_frame, num_frames, bytes, matches } => {
                 let name = clip_name(payload.index, first_frame);
-                let artefact =
-                    objects::write(store, context, &name, "application/octet-stream", bytes).await?;
+                let artefact = objects::write(store, context, &name, BINARY, bytes).await?;
                 written.artefacts.push(artefact);
                 written.clips.push(ClipPlace { name, first_frame, num_frames });
                 if let Some(bytes) = matches {
                     let name = matches_name(payload.index, first_frame);
-                    let artefact =
-                        objects::write(store, context, &name, "application/octet-stream", bytes).await?;
+                    let artefact = objects::write(store, context, &name, BINARY, bytes).await?;
                     written.artefacts.push(artefact);
                     written.matches.push(ClipPlace { name, first_frame, num_frames });
                 }

@@ -2,9 +2,9 @@ use model::shown;
 use serde::{Deserialize, Serialize};
 
 /// Most speeds of one augmentation.
-const MAX_WARPS: usize = 8;
+const MAX_SPEEDS: usize = 8;
 /// Speeds at which motion still is motion of a person.
-const WARPS: std::ops::RangeInclusive<f64> = 0.25..=4.0;
+const SPEEDS: std::ops::RangeInclusive<f64> = 0.25..=4.0;
 
 /// What a motion database holds beside its recordings: motion made from them, so that more is like what people do.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -12,8 +12,9 @@ const WARPS: std::ops::RangeInclusive<f64> = 0.25..=4.0;
 pub struct Augment {
     /// Every clip with left and right exchanged.
     pub mirror: bool,
-    /// Every clip at these speeds: 0.8 is slower, 1.25 faster.
-    pub warps: Vec<f64>,
+    /// Every clip at these speeds: 0.8 is slower, 1.25 faster. `warps` in requests, payloads and rows.
+    #[serde(rename = "warps")]
+    pub speeds: Vec<f64>,
 }
 
 /// An augmentation that makes no sense.
@@ -21,20 +22,20 @@ pub struct Augment {
 #[non_exhaustive]
 pub enum Error {
     /// Too many speeds.
-    #[error("augment.warps has {found} speeds, expected at most {MAX_WARPS}")]
-    TooManyWarps {
+    #[error("augment.warps has {found} speeds, expected at most {MAX_SPEEDS}")]
+    TooManySpeeds {
         /// How many there are.
         found: usize,
     },
     /// No speed of motion.
     #[error("augment.warps has {}, expected speeds of 0.25 to 4 other than 1", shown(*found))]
-    Warp {
+    Speed {
         /// The speed.
         found: f64,
     },
     /// A speed that is there twice.
     #[error("augment.warps has {found} twice")]
-    WarpTwice {
+    SpeedTwice {
         /// The speed.
         found: f64,
     },
@@ -43,12 +44,12 @@ pub enum Error {
 impl Augment {
     /// Whether nothing is added.
     pub fn is_none(&self) -> bool {
-        !self.mirror && self.warps.is_empty()
+        !self.mirror && self.speeds.is_empty()
     }
 
     /// How many clips are made of one, itself among them.
     pub fn copies(&self) -> usize {
-        (1 + self.warps.len()) * (1 + usize::from(self.mirror))
+        (1 + self.speeds.len()) * (1 + usize::from(self.mirror))
     }
 
     /// Whether it makes sense.
@@ -56,15 +57,15 @@ impl Augment {
     /// # Errors
     /// Says what does not.
     pub fn check(&self) -> Result<(), Error> {
-        if self.warps.len() > MAX_WARPS {
-            return Err(Error::TooManyWarps { found: self.warps.len() });
+        if self.speeds.len() > MAX_SPEEDS {
+            return Err(Error::TooManySpeeds { found: self.speeds.len() });
         }
-        for (i, &found) in self.warps.iter().enumerate() {
-            if !WARPS.contains(&found) || found == 1.0 {
-                return Err(Error::Warp { found });
+        for (i, &found) in self.speeds.iter().enumerate() {
+            if !SPEEDS.contains(&found) || found == 1.0 {
+                return Err(Error::Speed { found });
             }
-            if self.warps[..i].contains(&found) {
-                return Err(Error::WarpTwice { found });
+            if self.speeds[..i].contains(&found) {
+                return Err(Error::SpeedTwice { found });
             }
         }
         Ok(())
@@ -77,13 +78,13 @@ mod tests {
 
     #[test]
     fn speeds_that_are_none_are_refused() {
-        let check = |warps: &[f64]| Augment { mirror: true, warps: warps.to_vec() }.check();
+        let check = |speeds: &[f64]| Augment { mirror: true, speeds: speeds.to_vec() }.check();
         assert_eq!(check(&[0.8, 1.25]), Ok(()));
         for bad in [f64::NAN, 0.0, -1.0, 1.0, f64::INFINITY, 5.0] {
             assert!(check(&[bad]).is_err(), "{bad}");
         }
-        assert_eq!(check(&[0.8, 0.8]), Err(Error::WarpTwice { found: 0.8 }));
-        assert_eq!(check(&[0.5; 9]), Err(Error::TooManyWarps { found: 9 }));
-        assert_eq!(Augment { mirror: true, warps: vec![0.8, 1.25] }.copies(), 6);
+        assert_eq!(check(&[0.8, 0.8]), Err(Error::SpeedTwice { found: 0.8 }));
+        assert_eq!(check(&[0.5; 9]), Err(Error::TooManySpeeds { found: 9 }));
+        assert_eq!(Augment { mirror: true, speeds: vec![0.8, 1.25] }.copies(), 6);
     }
 }

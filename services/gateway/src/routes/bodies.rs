@@ -5,6 +5,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use body::{UnknownSex, Wanted, shipped};
+use formats::media_type;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
@@ -33,14 +34,14 @@ pub(super) async fn file(
     let ready = model.ready()?;
     let name = format!("{}-{}.marey-body", ready.name, ready.version);
     let Some(store_key) = &ready.store_key else {
-        return Ok(whole(&name, "application/octet-stream", shipped().bytes.clone()));
+        return Ok(whole(&name, media_type::BINARY, shipped().bytes.clone()));
     };
     let object = Object {
         name: &name,
         store_key,
         bytes: model.version().bytes.unwrap_or_default(),
         blake3: &ready.blake3,
-        media_type: "application/octet-stream",
+        media_type: media_type::BINARY,
     };
     download::send(&by.app, &headers, &object).await
 }
@@ -97,7 +98,7 @@ pub(super) async fn glb(
         body::glb(&model, &model.shape(&alpha), None).map_err(|e| Error::Internal(e.to_string()))
     });
     let bytes = made.await.map_err(|e| Error::Internal(format!("task: {e}")))??;
-    Ok(whole(&format!("{}-{}.glb", ready.name, ready.version), "model/gltf-binary", bytes))
+    Ok(whole(&format!("{}-{}.glb", ready.name, ready.version), media_type::GLB, bytes))
 }
 
 /// An answer that is a file which is in no store. Names of models need no quoting.

@@ -34,7 +34,7 @@ pub(crate) struct MotionDatabaseDetails {
     used_by: Vec<User>,
 }
 
-/// What is in a motion database.
+/// What is in a motion database: `jobs::motion_database::Contents`, described for the API, of which `jobs` knows nothing.
 #[derive(Debug, Serialize, Deserialize, ToSchema)]
 pub(crate) struct Contents {
     /// frames per second
@@ -73,19 +73,20 @@ pub(crate) struct Augment {
     /// every clip with left and right exchanged
     mirror: bool,
     /// every clip at these multiples of its recorded speed
+    #[serde(rename = "warps")]
     #[schema(example = json!([0.8, 1.25]))]
-    warps: Vec<f64>,
+    speeds: Vec<f64>,
 }
 
 impl From<Augment> for motion_database::Augment {
-    fn from(Augment { mirror, warps }: Augment) -> Self {
-        Self { mirror, warps }
+    fn from(Augment { mirror, speeds }: Augment) -> Self {
+        Self { mirror, speeds }
     }
 }
 
 impl From<motion_database::Augment> for Augment {
-    fn from(motion_database::Augment { mirror, warps }: motion_database::Augment) -> Self {
-        Self { mirror, warps }
+    fn from(motion_database::Augment { mirror, speeds }: motion_database::Augment) -> Self {
+        Self { mirror, speeds }
     }
 }
 
@@ -158,4 +159,28 @@ pub(crate) async fn augment(db: &mut PgConnection, id: Uuid) -> Result<Augment> 
             .fetch_one(db)
             .await?;
     Ok(contents.map(|Json(contents)| contents.augment).unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contents_are_shown_as_the_build_wrote_them() {
+        let share =
+            |name: &str| motion_database::Share { name: name.to_owned(), num_clips: 2, num_poses: 480 };
+        let built = motion_database::Contents {
+            frame_rate_hz: 60.0,
+            num_joints: 30,
+            num_dofs: 62,
+            actions: vec![share("walk")],
+            subjects: vec![share("7")],
+            augment: motion_database::Augment { mirror: true, speeds: vec![0.8] },
+            warnings: vec!["7_01.amc: doubtful".to_owned()],
+        };
+        let written = serde_json::to_value(&built).unwrap();
+        assert_eq!(written["augment"], serde_json::json!({"mirror": true, "warps": [0.8]}));
+        let read: Contents = serde_json::from_value(written.clone()).unwrap();
+        assert_eq!(serde_json::to_value(&read).unwrap(), written);
+    }
 }

@@ -6,11 +6,11 @@ use inverse_kinematics::sequence::Solved;
 use jobs::{
     JobReport,
     inverse_kinematics::SolveInverseKinematics,
-    multi_view::CameraReport,
-    run_json::{Origin, RUN_JSON, RunReport, Timings},
+    multi_view::{CameraReport, timings},
+    run_json::{Origin, RunReport},
 };
 use queue::JobError;
-use results::{ResultFile, media_type::JSON};
+use results::ResultFile;
 use serde_json::json;
 
 use super::finished::Finished;
@@ -101,12 +101,8 @@ pub(super) fn run_json(
             "frames_without_measurement": solved.iter().filter(|s| s.residual_m.is_none()).count(),
         },
     });
-    let mut timings = Timings::default();
-    if let Some(planned) = &request.cameras {
-        timings = timings.one("plan", &planned.plan);
-    }
-    let timings =
-        timings.all("cameras", cameras.iter().map(|camera| &camera.job)).one("solve", job).speed([job]);
+    let plan = request.cameras.as_ref().map(|planned| &planned.plan);
+    let timings = timings(plan, cameras).one("solve", job).speed([job]);
     let report = RunReport {
         origin,
         warnings: &finished.warnings,
@@ -114,7 +110,7 @@ pub(super) fn run_json(
         frames: Some((solved.len(), finished.frame_rate)),
         points: Some(finished.points.iter().map(String::as_str).collect()),
     };
-    Ok(ResultFile::ready(RUN_JSON, JSON, report.to_json(request, own)?))
+    results::run_json(&report, request, own)
 }
 
 #[cfg(test)]
