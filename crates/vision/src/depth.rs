@@ -128,6 +128,6 @@ impl DepthBuffer {
 
     fn index(&self, x: isize, y: isize) -> Option<usize> {
         let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
-        (x < self.width && y < self.height).then_some(y * self.width + x)
+        (x < self.width && y < self.height).then(|| y * self.width + x)
     }
 }
