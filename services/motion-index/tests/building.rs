@@ -5,9 +5,10 @@ mod fixture;
 use fixture::{Fixture, plan};
 use jobs::motion_database::{Augment, MotionDatabaseFile, PlanMotionDatabase, TrainGplvm};
 use motion_db::{MotionDatabase, trial_name};
-use queue::RunState;
+use queue::{ClaimedJob, Job, Lease, RunState};
 use regression::gplvm::TrainingOptions;
 use serde_json::{Value, json};
+use store::key;
 use testkit::walker;
 use uuid::Uuid;
 
@@ -178,6 +179,30 @@ async fn a_model_is_trained_and_recorded_with_its_database() {
     let run = fixture.run(&bad).await;
     assert_eq!(run.state, RunState::Failed);
     assert!(run.error_message.unwrap().contains("latent_dims"));
+    fixture.stop().await;
+}
+
+#[tokio::test]
+async fn what_a_lost_attempt_wrote_for_a_version_is_removed_by_the_next() {
+    let mut fixture = Fixture::new().await;
+    let id = fixture.build_walks(&[1, 2]).await;
+    let motion_database = fixture.file(id).await;
+    fixture.stop_service(0).await;
+    let parameters = TrainingOptions { latent_dims: 2, active: 32, max_iterations: 5 };
+    let run = fixture.enqueue("training", None, &TrainGplvm { motion_database, parameters }).await;
+    let mut connection = fixture.pool.acquire().await.unwrap();
+    let claimed = queue::claim(&mut connection, "lost", &[TrainGplvm::KIND], 1).await.unwrap();
+    let ClaimedJob { id: job_id, lease_number, .. } = claimed[0];
+    let left = key::motion_database(id, job_id.0, lease_number.0, "gplvm.model").unwrap();
+    fixture.put(&left, "half a model").await;
+    let lease = Lease { job_id, run_id: run, lease_number };
+    queue::hand_back(&mut connection, &lease).await.unwrap();
+    drop(connection);
+    fixture.serve(|_| {}).await;
+    let end = fixture.finished(run).await;
+    assert_eq!(end.state, RunState::Succeeded, "{:?}", end.error_message);
+    let gone = fixture.store.size(&left).await;
+    assert!(matches!(gone, Err(store::Error::NotFound { .. })), "{gone:?}");
     fixture.stop().await;
 }
 
