@@ -167,7 +167,7 @@ mod tests {
             (&["run", "take 3", "--points", "root,,head"], "found \"\", expected a name"),
             (&["run", " "], "found \" \", expected a name"),
             (&["upload", " ", "points.csv"], "found \" \", expected a name"),
-            (&["bench", "live", "--streams", "0"], "must be at least 1"),
+            (&["bench", "live", "--streams", "0"], "found \"0\", expected a whole number, 1 or above"),
             (&["data", "cmu", "--subjects", "abc", "rec"], "found \"abc\", expected a number such as 16"),
             (&["live", "points.csv", "-d", "walks", "--points", ""], "found \"\", expected a name"),
         ] {
