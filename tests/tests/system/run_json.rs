@@ -14,6 +14,8 @@ struct Expected {
     kind: &'static str,
     /// what it is on
     subject: &'static str,
+    /// what is said of that beside what is said of all such subjects
+    subject_own: &'static [&'static str],
     /// its input files
     files: Vec<Value>,
     /// versions of what was learned before
@@ -31,10 +33,12 @@ fn every_kind_of_run_says_who_made_its_results_from_what() -> Result<()> {
         build_database(&api)?,
         train(&api)?,
         build_body_model(&api)?,
-        sparse(&api)?,
+        sparse(&api, "local-regression")?,
+        sparse(&api, "gplvm")?,
         multi_view(&api, false, &["plan", "cameras", "fit_shape"])?,
         multi_view(&api, true, &["plan", "cameras", "fit_shape", "chunks", "merge"])?,
-        solve(&api)?,
+        solve(&api, 1)?,
+        solve(&api, 0)?,
     ];
     let whole = [
         "code",
@@ -55,6 +59,12 @@ fn every_kind_of_run_says_who_made_its_results_from_what() -> Result<()> {
         let report = api.get(&format!("{}/results/run.json", expected.run))?.json();
         check(&report, &expected).with_context(|| format!("{}: {report:#}", expected.kind))?;
         assert_eq!(head(&report, &expected)?, whole, "head of {}", expected.kind);
+        let subject: &[&str] = match expected.subject {
+            "session" => &["files", "frame_rate_hz", "frames", "id", "name", "reading"],
+            _ => &["files", "id", "name", "version"],
+        };
+        let found = keys(&report[expected.subject], expected.subject_own)?;
+        assert_eq!(found, subject, "{} of {}", expected.subject, expected.kind);
     }
     Ok(())
 }
@@ -71,23 +81,30 @@ fn head(report: &Value, expected: &Expected) -> Result<Vec<String>> {
     let mut keys = vec!["subject".to_owned()];
     keys.extend(all.filter(|key| *key != expected.subject && !is_own(key)).map(str::to_owned));
     keys.extend(object(&report["code"])?.keys().map(|key| format!("code.{key}")));
-    let subject = object(&report[expected.subject])?;
-    for key in ["id", "name", "files"] {
-        ensure!(subject.contains_key(key), "{} has no {key}", expected.subject);
-    }
     keys.sort();
+    Ok(keys)
+}
+
+/// The keys of an object, sorted: all but its `own`, which it must have too.
+fn keys<'a>(value: &'a Value, own: &[&str]) -> Result<Vec<&'a str>> {
+    let mut keys: Vec<&str> = object(value)?.keys().map(String::as_str).collect();
+    for key in own {
+        ensure!(keys.contains(key), "no {key} in {value}");
+    }
+    keys.retain(|key| !own.contains(key));
+    keys.sort_unstable();
     Ok(keys)
 }
 
 fn check(report: &Value, expected: &Expected) -> Result<()> {
     let id = expected.run.rsplit('/').next().unwrap_or_default();
     ensure!(report["run_id"] == id && report["kind"] == expected.kind, "run and kind");
-    let code = &report["code"];
-    ensure!(code["version"] == env!("CARGO_PKG_VERSION"), "version of the code");
+    let code = json!({ "version": env!("CARGO_PKG_VERSION"), "commit": marey::CODE.commit });
+    ensure!(report["code"] == code, "code of the run, expected {code}");
     let is_checkout = Path::new(env!("CARGO_MANIFEST_DIR")).join("../.git").exists();
-    match code["commit"].as_str() {
+    match marey::CODE.commit {
         Some(commit) => ensure!(!commit.is_empty(), "the commit is empty"),
-        None => ensure!(code["commit"].is_null() && !is_checkout, "no commit, though there is a checkout"),
+        None => ensure!(!is_checkout, "no commit, though there is a checkout"),
     }
     let subject = object(&report[expected.subject])?;
     ensure!(
@@ -96,11 +113,15 @@ fn check(report: &Value, expected: &Expected) -> Result<()> {
     );
     let files = subject["files"].as_array().context("no files")?;
     for (found, uploaded) in files.iter().zip(&expected.files) {
-        for key in ["name", "role", "bytes", "blake3"] {
-            ensure!(found[key] == uploaded[key] && !found[key].is_null(), "{key} of {found}");
+        ensure!(keys(found, &[])? == ["blake3", "bytes", "name", "role"], "keys of {found}");
+        for (key, value) in object(found)? {
+            ensure!(*value == uploaded[key] && !value.is_null(), "{key} of {found}");
         }
     }
     ensure!(files.len() == expected.files.len(), "number of input files");
+    if report["parameters"]["method"] == "gplvm" {
+        ensure!(report["motion_database"]["gplvm"]["blake3"].is_string(), "the model that was trained");
+    }
     for learned in expected.learned_from {
         let learned = object(&report[learned])?;
         ensure!(learned["version"].is_i64() && learned["blake3"].as_str().is_some_and(|b| b.len() == 64));
@@ -154,53 +175,66 @@ fn build_database(api: &Api) -> Result<Expected> {
     ensure!(end["state"] == "succeeded", "{end}");
     let stages = &["plan", "imports", "build"];
     let (kind, subject, files) = ("motion-database", "motion_database", files(api, path)?);
-    Ok(Expected { run, kind, subject, files, learned_from: &[], stages })
+    Ok(Expected { run, kind, subject, subject_own: &[], files, learned_from: &[], stages })
 }
 
 fn train(api: &Api) -> Result<Expected> {
     let parameters = json!({"latent_dims": 2, "active": 48, "max_iterations": 5});
     let request = json!({"method": "gplvm", "parameters": parameters});
     let run = path_of(&api.make("/v1/motion-databases/walks/train", &request)?)?;
+    // a run below uses it
+    let end = api.wait(&run)?;
+    ensure!(end["state"] == "succeeded", "{end}");
     let (kind, subject, stages) = ("training", "motion_database", &["train"]);
-    // it reads the database itself
-    Ok(Expected { run, kind, subject, files: Vec::new(), learned_from: &["motion_database"], stages })
+    // it reads the database itself, which has been built
+    let (files, subject_own, learned_from) = (Vec::new(), &["blake3"], &["motion_database"]);
+    Ok(Expected { run, kind, subject, subject_own, files, learned_from, stages })
 }
 
 fn build_body_model(api: &Api) -> Result<Expected> {
     let (path, run, end) = bodies::build(api, "people", &bodies::scans(8))?;
     ensure!(end["state"] == "succeeded", "{end}");
     let (kind, subject, files) = ("body-model", "body_model", files(api, &path)?);
-    Ok(Expected { run, kind, subject, files, learned_from: &[], stages: &["build"] })
+    Ok(Expected { run, kind, subject, subject_own: &[], files, learned_from: &[], stages: &["build"] })
 }
 
-fn sparse(api: &Api) -> Result<Expected> {
+fn sparse(api: &Api, method: &str) -> Result<Expected> {
     let session = crate::session(api, 21, 240)?;
-    let run = api.start_run(&session, &json!({"motion_database": "walks"}))?;
-    let (files, learned_from) = (files(api, &session)?, &["motion_database"]);
+    let run = api.start_run(&session, &json!({"motion_database": "walks", "method": method}))?;
+    let (files, subject_own, learned_from) = (files(api, &session)?, &["points"], &["motion_database"]);
     let stages = &["plan", "chunks", "merge"];
-    Ok(Expected { run, kind: "sparse", subject: "session", files, learned_from, stages })
+    Ok(Expected { run, kind: "sparse", subject: "session", subject_own, files, learned_from, stages })
 }
 
 fn multi_view(api: &Api, track: bool, stages: &'static [&'static str]) -> Result<Expected> {
     let session = tracking::take(0)?.upload(api)?;
     let parameters = json!({"track": track, "overlay": false, "frame_rate": 25});
     let run = api.start_run(&session, &json!({ "parameters": parameters }))?;
-    let files = files(api, &session)?;
-    Ok(Expected { run, kind: "multi-view", subject: "session", files, learned_from: &["body_model"], stages })
+    let (files, learned_from) = (files(api, &session)?, &["body_model"]);
+    Ok(Expected {
+        run,
+        kind: "multi-view",
+        subject: "session",
+        subject_own: &[],
+        files,
+        learned_from,
+        stages,
+    })
 }
 
-fn solve(api: &Api) -> Result<Expected> {
-    let capture = inverse_kinematics::capture(1)?;
-    let session = api.session(
-        "take",
-        &[
-            ("calibration.json", &capture.calibration),
-            ("silhouettes.tar", &capture.masks),
-            ("points.csv", &capture.points),
-        ],
-    )?;
+fn solve(api: &Api, cameras: usize) -> Result<Expected> {
+    let capture = inverse_kinematics::capture(cameras)?;
+    let mut uploads: Vec<(&str, &[u8])> = vec![("points.csv", &capture.points)];
+    if cameras > 0 {
+        uploads.extend([
+            ("calibration.json", capture.calibration.as_slice()),
+            ("silhouettes.tar", capture.masks.as_slice()),
+        ]);
+    }
+    let session = api.session("take", &uploads)?;
     let run = api.start_run(&session, &json!({ "kind": "inverse-kinematics" }))?;
-    let (files, learned_from) = (files(api, &session)?, &["body_model"]);
-    let stages = &["plan", "cameras", "solve"];
-    Ok(Expected { run, kind: "inverse-kinematics", subject: "session", files, learned_from, stages })
+    let (files, subject_own, learned_from) = (files(api, &session)?, &["points"], &["body_model"]);
+    let stages: &[&str] = if cameras > 0 { &["plan", "cameras", "solve"] } else { &["solve"] };
+    let kind = "inverse-kinematics";
+    Ok(Expected { run, kind, subject: "session", subject_own, files, learned_from, stages })
 }
