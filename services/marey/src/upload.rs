@@ -127,11 +127,13 @@ mod tests {
     use clap::{CommandFactory, Parser};
 
     use super::*;
-    use crate::alone::Alone;
+    use crate::{alone::Alone, cli::Cli};
 
     #[test]
     fn the_help_names_all_roles_and_the_endings_of_their_files() {
-        let help = Alone::<Args>::command().render_long_help().to_string();
+        let mut command = Cli::command();
+        let upload = command.find_subcommand_mut("upload").expect("there is such a command");
+        let help = upload.render_long_help().to_string();
         let roles = [
             FileRole::Skeleton,
             FileRole::ControlPoints,
