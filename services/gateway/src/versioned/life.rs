@@ -82,6 +82,7 @@ pub(crate) async fn delete<V: Versioned>(by: Access, which: String) -> Result<St
                 row.version().name
             )));
         }
+        users::check_none(&mut tx, &row).await?;
         if which == row.version().name {
             // a request that is sent again must not delete the version before
             return Err(Error::Unprocessable(format!(
@@ -89,7 +90,6 @@ pub(crate) async fn delete<V: Versioned>(by: Access, which: String) -> Result<St
                 row.version()
             )));
         }
-        users::check_none(&mut tx, &row).await?;
         sqlx::query(V::NOUN.sql.delete).bind(row.id()).execute(&mut *tx).await?;
         let runs: Vec<RunId> = sqlx::query_scalar(
             "DELETE FROM runs WHERE project_id = $1 AND kind = ANY($2) AND parameters->$3->>'id' = $4 RETURNING id",
