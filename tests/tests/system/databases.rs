@@ -171,7 +171,11 @@ fn a_gplvm_is_trained_before_it_is_used() -> Result<()> {
     let request = json!({"motion_database": "walks", "method": "gplvm"});
     let refused = api.post(&format!("{session}/runs"), &request)?;
     let detail = refused.json()["detail"].as_str().unwrap_or_default().to_owned();
-    assert!(refused.status == 409 && detail.contains("marey db train walks@1"), "{} {detail}", refused.status);
+    assert!(
+        refused.status == 409 && detail.contains("marey db train walks@1"),
+        "{} {detail}",
+        refused.status
+    );
     let parameters = json!({"latent_dims": 2, "active": 48, "max_iterations": 20});
     let run =
         api.make("/v1/motion-databases/walks/train", &json!({"method": "gplvm", "parameters": parameters}))?;
