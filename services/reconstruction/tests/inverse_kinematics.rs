@@ -149,33 +149,19 @@ async fn what_can_not_be_solved_is_refused_with_what_was_found() {
         change(&mut body);
         v1::SolveInverseKinematicsRequest { performer: Some(Performer::Body(body)), ..request.clone() }
     };
-    let frames = |change: &dyn Fn(&mut Vec<v1::InverseKinematicsFrame>)| {
+    let whole = |change: &dyn Fn(&mut v1::SolveInverseKinematicsRequest)| {
         let mut changed = request.clone();
-        change(&mut changed.frames);
+        change(&mut changed);
         changed
     };
+    let frames =
+        |change: &dyn Fn(&mut Vec<v1::InverseKinematicsFrame>)| whole(&|request| change(&mut request.frames));
     let cases = [
         (frames(&|f| f.clear()), Code::InvalidArgument, "found 0 frames, expected 1 to 600"),
-        (
-            v1::SolveInverseKinematicsRequest { steps: 201, ..request.clone() },
-            Code::InvalidArgument,
-            "steps is 201",
-        ),
-        (
-            v1::SolveInverseKinematicsRequest { performer: None, ..request.clone() },
-            Code::InvalidArgument,
-            "performer",
-        ),
-        (
-            v1::SolveInverseKinematicsRequest { calibration: vec![], ..request.clone() },
-            Code::InvalidArgument,
-            "calibration",
-        ),
-        (
-            v1::SolveInverseKinematicsRequest { calibration: b"{}".to_vec(), ..request.clone() },
-            Code::InvalidArgument,
-            "frame 0: calibration.json",
-        ),
+        (whole(&|r| r.steps = 201), Code::InvalidArgument, "steps is 201"),
+        (whole(&|r| r.performer = None), Code::InvalidArgument, "performer"),
+        (whole(&|r| r.calibration.clear()), Code::InvalidArgument, "calibration"),
+        (whole(&|r| r.calibration = b"{}".to_vec()), Code::InvalidArgument, "frame 0: calibration.json"),
         (
             frames(&|f| f[0].targets[0].name = "tail".into()),
             Code::InvalidArgument,
@@ -204,10 +190,7 @@ async fn what_can_not_be_solved_is_refused_with_what_was_found() {
         (body(&|b| b.body_model_id = "mine".into()), Code::InvalidArgument, "body_model_id"),
         (body(&|b| b.body_model_id = uuid::Uuid::nil().to_string()), Code::NotFound, "does not exist"),
         (
-            v1::SolveInverseKinematicsRequest {
-                performer: Some(Performer::SkeletonAsf("x".into())),
-                ..request.clone()
-            },
+            whole(&|r| r.performer = Some(Performer::SkeletonAsf("x".into()))),
             Code::InvalidArgument,
             "skeleton_asf: ",
         ),
