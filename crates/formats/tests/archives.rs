@@ -53,6 +53,16 @@ fn entry(name: &str, text: &str) -> Entry {
 }
 
 #[test]
+fn an_archive_whose_checksum_is_wrong_is_refused() {
+    let mut packed = gzip(&tar(&[("a.bvh", b"HIERARCHY"), ("b.bvh", b"HIERARCHY")]));
+    assert_eq!(entries(&packed).unwrap().len(), 2);
+    let checksum = packed.len() - 8;
+    packed[checksum] ^= 1;
+    let error = entries(&packed).unwrap_err().to_string();
+    assert!(error.contains("checksum"), "{error}");
+}
+
+#[test]
 fn every_kind_of_archive_gives_the_same_files() {
     let (a, b) = (b"first".repeat(100), b"second".repeat(100));
     let packed = zstd(&a);

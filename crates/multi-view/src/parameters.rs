@@ -75,8 +75,7 @@ impl Default for Parameters {
 
 impl Parameters {
     /// The fields that decide the silhouettes. All others are of what comes after them.
-    pub const OF_SILHOUETTES: [&str; 5] =
-        ["first_frame", "num_frames", "largest_side", "frame_rate", "background"];
+    pub const OF_SILHOUETTES: [&str; 4] = ["first_frame", "num_frames", "largest_side", "background"];
 
     /// Checks that every number is in its range.
     ///

@@ -57,9 +57,9 @@ impl Config {
     /// # Errors
     /// If one is missing or can't be read, naming it.
     pub fn from_variables(variable: impl Fn(&str) -> Option<String>) -> anyhow::Result<Self> {
-        let required = |name: &str| {
-            variable(name).filter(|v| !v.is_empty()).ok_or_else(|| anyhow::anyhow!("{name} is not set"))
-        };
+        // as for all services: what is empty is not set
+        let variable = |name: &str| variable(name).filter(|value| !value.is_empty());
+        let required = |name: &str| variable(name).ok_or_else(|| anyhow::anyhow!("{name} is not set"));
         let store = required("MAREY_STORE")?;
         let mut config = Self::new(
             required("MAREY_DATABASE_URL")?,
@@ -71,15 +71,15 @@ impl Config {
             })?;
         }
         if let Some(bytes) = variable("MAREY_MAX_UPLOAD_BYTES") {
-            config.max_upload_bytes = bytes.parse().map_err(|_| {
-                anyhow::anyhow!("MAREY_MAX_UPLOAD_BYTES is {bytes:?}, expected a number of bytes")
+            config.max_upload_bytes = bytes.parse().ok().filter(|bytes| *bytes > 0).ok_or_else(|| {
+                anyhow::anyhow!("MAREY_MAX_UPLOAD_BYTES is {bytes:?}, expected a number of bytes above 0")
             })?;
         }
-        let replicas = variable("MAREY_RECONSTRUCTION").filter(|addresses| !addresses.is_empty());
+        let replicas = variable("MAREY_RECONSTRUCTION");
         let replicas = replicas.unwrap_or_else(|| DEFAULT_RECONSTRUCTION.to_owned());
         config.reconstruction =
             replicas.parse().map_err(|e| anyhow::anyhow!("MAREY_RECONSTRUCTION has {e}"))?;
-        config.bootstrap_key = variable("MAREY_BOOTSTRAP_KEY").filter(|key| !key.is_empty());
+        config.bootstrap_key = variable("MAREY_BOOTSTRAP_KEY");
         Ok(config)
     }
 }

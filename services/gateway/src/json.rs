@@ -7,7 +7,7 @@ use serde::{
     Deserializer,
     de::{
         DeserializeOwned, DeserializeSeed, Error as _, Expected, MapAccess, SeqAccess, Unexpected, Visitor,
-        value::{BorrowedStrDeserializer, MapAccessDeserializer},
+        value::BorrowedStrDeserializer,
     },
     forward_to_deserialize_any,
 };
@@ -229,9 +229,6 @@ impl<'de> Deserializer<'de> for Node<'de> {
     ) -> Result<V::Value, Refusal> {
         match self.0 {
             Value::String(word) => visitor.visit_enum(BorrowedStrDeserializer::new(word)),
-            Value::Object(object) if object.len() == 1 => {
-                visitor.visit_enum(MapAccessDeserializer::new(Fields::new(object, &[])))
-            }
             _ => Err(Refusal::invalid_type(self.unexpected(), &one_of(known).as_str())),
         }
     }

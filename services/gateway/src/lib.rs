@@ -36,5 +36,5 @@ pub use error::Error;
 pub use live::Replicas;
 pub use names::{check_file_name, check_versioned_name};
 pub use routes::{openapi_document, router};
-pub use runs::{session_run_fields, session_run_kinds};
+pub use runs::{UNITS, session_run_fields, session_run_kinds};
 pub use server::{Gateway, run};

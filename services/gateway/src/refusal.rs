@@ -68,7 +68,8 @@ pub(crate) fn path<'a>(steps: impl IntoIterator<Item = &'a Step>) -> String {
     })
 }
 
-fn shortened(text: &str) -> String {
+/// Text of a request without quotes: a name, as far as it is repeated to its sender.
+pub(crate) fn shortened(text: &str) -> String {
     let visible = |c: char| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c };
     text.chars().take(MAX_QUOTED_CHARS).map(visible).collect()
 }

@@ -10,14 +10,14 @@ use anyhow::{Context, anyhow, bail};
 use body::{ScanOptions, ScanSet, shipped};
 use client::{
     Client, Request, Run, ServerArgs, encode,
-    numbers::{finite, positive},
+    numbers::{finite, not_negative, positive},
 };
 use formats::archive::{self, Entry, Limits};
 use serde_json::Value;
 
 use model::counted;
 
-use crate::{database::or_removed, pack, watch};
+use crate::{database::or_removed, pack, watch, words::unit};
 
 /// `marey body …`
 #[derive(Debug, clap::Subcommand)]
@@ -72,7 +72,7 @@ pub struct LearnArgs {
     #[arg(long, default_value_t = ::body::MAX_COMPONENTS, value_parser = components)]
     components: usize,
     /// Length of one unit of the scans, in metres [default: 1; for NPY it is worked out]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
+    #[arg(long, value_name = "METRES", value_parser = unit)]
     unit: Option<f64>,
     /// Show the progress and wait until it is learned
     #[arg(long, short)]
@@ -94,7 +94,7 @@ pub struct SampleArgs {
     #[arg(long, value_name = "KG", value_parser = positive)]
     mass: Option<f64>,
     /// Age in years
-    #[arg(long, value_name = "YEARS", value_parser = positive)]
+    #[arg(long, value_name = "YEARS", value_parser = not_negative)]
     age: Option<f64>,
     /// female or male
     #[arg(long)]

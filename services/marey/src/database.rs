@@ -9,7 +9,10 @@ use client::{
 use jobs::motion_database::{Augment, Error};
 use model::{counted, shown};
 
-use crate::{database_show, pack, watch, words::name};
+use crate::{
+    database_show, pack, watch,
+    words::{name, unit},
+};
 
 /// `marey db …`
 #[derive(Debug, clap::Subcommand)]
@@ -84,7 +87,7 @@ struct BuildOptions {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     shards: Option<u8>,
     /// Length of one unit of BVH files, in metres; the files don't say it [default: 0.01, centimetres]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
+    #[arg(long, value_name = "METRES", value_parser = unit)]
     bvh_metres_per_unit: Option<f64>,
     /// Show the progress and wait until it is built
     #[arg(long, short)]

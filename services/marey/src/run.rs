@@ -5,13 +5,16 @@ use body::Sex;
 use clap::builder::PossibleValuesParser;
 use client::{
     Client, Request, Run, ServerArgs,
-    numbers::positive,
+    numbers::{not_negative, positive},
     parameters::{pairs, values},
 };
 use model::Axis;
 use serde_json::{Value, json};
 
-use crate::{marker_sets, watch, words::name};
+use crate::{
+    marker_sets, watch,
+    words::{name, unit},
+};
 
 /// Reconstruct a session: a motion from control points, or a body and its motion from what cameras saw
 ///
@@ -94,7 +97,7 @@ struct SparseArgs {
     #[arg(long, value_name = "NUMBER")]
     neighbours: Option<u32>,
     /// Length of one unit of BVH files, in metres [default: 0.01, centimetres]
-    #[arg(long, visible_alias = "bvh-unit", value_name = "METRES", value_parser = positive)]
+    #[arg(long, visible_alias = "bvh-unit", value_name = "METRES", value_parser = unit)]
     bvh_metres_per_unit: Option<f64>,
 }
 
@@ -116,7 +119,7 @@ struct CameraArgs {
     #[arg(long)]
     background: Option<String>,
     /// Length of one unit of the calibration, in metres, if its file doesn't say it
-    #[arg(long, value_name = "METRES", value_parser = positive)]
+    #[arg(long, value_name = "METRES", value_parser = unit)]
     calibration_unit: Option<f64>,
 }
 
@@ -141,7 +144,7 @@ struct InverseKinematicsArgs {
     #[arg(long, value_name = "KG", value_parser = positive)]
     mass: Option<f64>,
     /// The person's age in years
-    #[arg(long, value_name = "YEARS", value_parser = positive)]
+    #[arg(long, value_name = "YEARS", value_parser = not_negative)]
     age: Option<f64>,
     /// female or male
     #[arg(long)]

@@ -36,9 +36,6 @@ fn found(finished: &Finished) -> Value {
         json!({ "frame": seam.frame, "apart_m": seam.apart_m, "is_smooth": seam.is_smooth })
     });
     json!({
-        "first_frame": frames.first().map(|tracked| tracked.frame),
-        "frames": frames.len(),
-        "frame_rate_hz": finished.frame_rate,
         "overlap": mean(frames.iter().filter(|t| t.stage != Stage::Unseen).map(Tracked::mean_iou)),
         "overlap_by_camera": cameras,
         "frames_by_stage": stages,

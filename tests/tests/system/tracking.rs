@@ -186,7 +186,7 @@ fn a_person_in_masks_is_followed_and_every_result_can_be_read() -> Result<()> {
     assert_eq!(String::from_utf8(result("poses.csv")?)?.lines().count(), FRAMES + 1);
     let report: Value = serde_json::from_slice(&result("run.json")?)?;
     let tracking = &report["tracking"];
-    assert_eq!(tracking["frames"], FRAMES);
+    assert_eq!(report["session"]["frames"], FRAMES);
     assert_eq!(tracking["seams"][0]["is_smooth"], true, "{tracking}");
     assert!(tracking["overlap"].as_f64() > Some(0.93), "{tracking}");
     assert_eq!(report["timings"]["chunks"].as_array().map(Vec::len), Some(2));

@@ -6,7 +6,7 @@ mod name;
 mod tar;
 mod zip;
 
-use std::io::Read as _;
+use std::io::{self, Read as _};
 
 use crate::{Error, Result};
 use budget::Budget;
@@ -90,7 +90,9 @@ pub fn entries_where(
             let read = unpacked.by_ref().take(tar::HEADER_BYTES).read_to_end(&mut head);
             read.map_err(|e| stream.error(compression.name(), &e))?;
             if tar::is_header(&head) {
-                tar::read(head.as_slice().chain(unpacked), &stream, &mut unpacking)?;
+                tar::read(head.as_slice().chain(unpacked.by_ref()), &stream, &mut unpacking)?;
+                // checksums stand at the end, behind what tar reads
+                io::copy(&mut unpacked, &mut io::sink()).map_err(|e| stream.error(compression.name(), &e))?;
                 return Ok(unpacking.entries);
             }
             refuse_name_of_archive(name)?;

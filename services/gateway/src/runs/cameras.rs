@@ -45,7 +45,7 @@ pub(super) struct CameraFields {
     /// `num_frames`, `frame_rate` (where no video tells it), `chunk_frames` and `overlap_frames` (frames that are tracked in
     /// one piece, and that it goes on into the next), `particles` (0: none), `iterations`, `prior` and `seed` of the search
     /// for limbs that do not fit, `texture` (points are followed in the pictures), `overlay` (a video of each camera); runs
-    /// by inverse kinematics take `first_frame`, `num_frames`, `largest_side`, `frame_rate` and `background` alone
+    /// by inverse kinematics take `first_frame`, `num_frames`, `largest_side` and `background` alone
     #[schema(example = json!({"chunk_frames": 150, "particles": 25}))]
     parameters: Map<String, Value>,
 }
@@ -60,6 +60,9 @@ impl CameraFields {
                 self.camera_files.len()
             )));
         }
+        if self.cameras.iter().any(|name| name.trim().is_empty()) {
+            return Err(Error::Unprocessable("cameras has an empty name".into()));
+        }
         let mut names = self.cameras.iter().enumerate();
         if let Some((_, name)) = names.find(|(place, name)| self.cameras[..*place].contains(name)) {
             return Err(Error::Unprocessable(format!("cameras has {name:?} twice, expected each once")));
@@ -73,6 +76,10 @@ impl CameraFields {
         let mut given = self.parameters.iter().filter(|(_, value)| !value.is_null());
         match given.find(|(name, _)| !Parameters::OF_SILHOUETTES.contains(&name.as_str())) {
             None => Ok(()),
+            Some((name, _)) if name == "frame_rate" => Err(Error::Unprocessable(
+                "parameters.frame_rate is not for inverse kinematics; use inverse_kinematics.frame_rate"
+                    .into(),
+            )),
             Some((name, _)) => Err(Error::Unprocessable(format!(
                 "parameters.{name} is not for inverse kinematics, which takes {} of a camera run's parameters",
                 one_of(&Parameters::OF_SILHOUETTES)

@@ -48,6 +48,13 @@ impl MarkerFields {
         if self.mapping.len() > MAX_NAMES {
             return refuse(format!("mapping has {} names, expected at most {MAX_NAMES}", self.mapping.len()));
         }
+        let is_empty = |name: &String| name.trim().is_empty();
+        if self.mapping.iter().any(|(name, point)| is_empty(name) || is_empty(point)) {
+            return refuse("mapping has an empty name".into());
+        }
+        if self.points.iter().any(is_empty) {
+            return refuse("points has an empty name".into());
+        }
         self.check_markers()?;
         if self.points.is_empty() {
             return Ok(());

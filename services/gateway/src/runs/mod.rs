@@ -21,6 +21,7 @@ pub(crate) use motion_database::NewBuild;
 pub(crate) use run::{Run, RunWithJobs};
 pub(crate) use sparse::resolve_parameters;
 pub(crate) use training::{NewTraining, train};
+pub use units::UNITS;
 
 use session_run::Kind;
 

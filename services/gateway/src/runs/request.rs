@@ -17,7 +17,10 @@ use super::{
     enqueue::NewRun,
     session_run::{Asked, Kind, OnSession},
 };
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    refusal::shortened,
+};
 
 /// Name of the request in OpenAPI.
 const NAME: &str = "NewSessionRun";
@@ -118,7 +121,8 @@ fn read(kind: &Kind, mut fields: Map<String, Value>) -> Result<Box<dyn Asked>> {
         };
         let has: Vec<&str> = own.keys().map(String::as_str).collect();
         return Err(Error::Unprocessable(format!(
-            "{name} is not a field of {} runs{belongs}; they have: {}",
+            "{} is not a field of {} runs{belongs}; they have: {}",
+            shortened(name),
             kind.name,
             has.join(", ")
         )));

@@ -116,6 +116,7 @@ impl SparseRun {
     /// All parameters of the method, those with a field of their own among them.
     fn resolve(&self, has_own_skeleton: bool) -> Result<Parameters> {
         let mut given = self.parameters.clone();
+        given.retain(|_, value| !value.is_null());
         let named = [
             ("method", self.method.map(|method| method.name().into())),
             ("window", self.window.map(Value::from)),
